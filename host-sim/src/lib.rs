@@ -1,0 +1,1 @@
+//! The plant behind the control core, and the bench engineer's tool.

@@ -1,0 +1,5 @@
+//! Friction models and the control core of the rubber-asphalt rig.
+#![no_std]
+#![forbid(unsafe_code)]
+pub mod error;
+pub mod real;

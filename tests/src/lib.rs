@@ -1,0 +1,1 @@
+//! Generators of logs with a hidden effect; they share no code with the product.
