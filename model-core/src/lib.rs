@@ -1,6 +1,7 @@
 //! Friction models and the control core of the rubber-asphalt rig.
 #![no_std]
 #![forbid(unsafe_code)]
+pub mod control;
 pub mod error;
 pub mod friction;
 pub mod real;
