@@ -1,1 +1,6 @@
 //! The plant behind the control core, and the bench engineer's tool.
+#![forbid(unsafe_code)]
+
+pub mod cli;
+pub mod files;
+pub mod input_error;

@@ -1,0 +1,106 @@
+//! The command line of `rig`: one file a subcommand.
+//!
+//! A subcommand is a `clap::Args` struct with `fn run(self) -> Result<(), InputError>` in its own file
+//! and one line in [`Command`] here.
+
+pub mod common;
+
+pub mod progress;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::input_error::InputError;
+
+/// Exit status for bad input.
+const BAD_INPUT: u8 = 2;
+
+#[derive(Parser)]
+#[command(
+    name = "rig",
+    version,
+    about = "Simulate, identify and diagnose the rubber-asphalt friction rig",
+    long_about = "Simulate, identify and diagnose the rubber-asphalt friction rig.\n\n\
+                  All quantities are in SI units, and every name carries its unit: normal_force_n, time_s.\n\
+                  Exit status is 0 on success and 2 for bad input, with one line on stderr.",
+    disable_help_subcommand = true
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Declares the subcommands: one line each.
+macro_rules! commands {
+    ($($(#[$meta:meta])* $name:ident($args:ty)),* $(,)?) => {
+        #[derive(Subcommand)]
+        enum Command {
+            $($(#[$meta])* $name($args),)*
+        }
+
+        impl Command {
+            fn run(self) -> Result<(), InputError> {
+                match self {
+                    $(Self::$name(args) => args.run(),)*
+                }
+            }
+        }
+    };
+}
+
+commands! {}
+
+/// Runs the tool with the arguments of the process.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse_arguments(&error),
+    };
+    match cli.command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("rig: {error}");
+            ExitCode::from(BAD_INPUT)
+        }
+    }
+}
+
+/// Help and version go out as they are; a wrong argument becomes one line.
+fn refuse_arguments(error: &clap::Error) -> ExitCode {
+    use clap::error::ErrorKind;
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        // Nobody is left to tell where even the help cannot be printed.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        let _ = error.print();
+        return ExitCode::from(BAD_INPUT);
+    }
+    let text = error.to_string();
+    let said: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let said = said.join(" ");
+    eprintln!("rig: {}; see rig --help", said.strip_prefix("error: ").unwrap_or(&said));
+    ExitCode::from(BAD_INPUT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent_and_every_subcommand_shows_an_example() {
+        Cli::command().debug_assert();
+        for command in Cli::command().get_subcommands() {
+            let help = command.clone().render_long_help().to_string();
+            assert!(help.contains("Example"), "{}", command.get_name());
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! A log: signals over time from the rig, the PC rig or another machine.
+//!
+//! Format: one header line of comma-separated names with SI units in them, one line a sample, `.`
+//! decimals, time strictly increasing; lines that start with `#` are `# key: value` metadata. Parquet
+//! files hold the same columns. Column order is free. Columns the tool does not know are kept: as
+//! numbers where every cell is one, else as text.
+//! Refused, with the line: NaN and infinities in known columns, time that stands still or goes back,
+//! gaps ([`gap rule`](Log::GAP_RULE)), ragged lines, two columns of one name, a known quantity in
+//! another unit.
+//! Left out: resampling. Uneven sampling is passed on as it is.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use super::signal::{SIGNALS, Signal};
+use super::{log_check, log_csv, log_parquet};
+use crate::input_error::InputError;
+
+/// Cells of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cells {
+    /// Finite numbers.
+    Numbers(Vec<f64>),
+    /// An unknown column with at least one cell that is not a finite number, as it was written.
+    Text(Vec<String>),
+}
+
+impl Cells {
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Numbers(values) => values.len(),
+            Self::Text(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A named column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name with unit.
+    pub name: String,
+    /// One cell a sample.
+    pub cells: Cells,
+}
+
+/// What a log can be used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogKind {
+    /// The elements touch the disc: motion, normal force and friction torque are there.
+    Contact,
+    /// A rotary drive alone: torque in, angle out.
+    RotaryDrive,
+    /// A linear stage alone: force in, position out.
+    LinearDrive,
+}
+
+/// Signals over time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Log {
+    /// The file as the user named it; what errors about this log say.
+    pub source: String,
+    /// `# key: value` lines in their order; a comment without `:` has an empty key.
+    pub metadata: Vec<(String, String)>,
+    /// Columns in their order.
+    pub columns: Vec<Column>,
+    /// Line in the file of each sample where lines were left out between (metadata, blank lines):
+    /// `(sample, line)` from which the lines count on; empty for Parquet.
+    pub(super) line_marks: Vec<(usize, u64)>,
+}
+
+/// What the contact models are driven with and compared to.
+#[derive(Debug, Clone)]
+pub struct ContactSignals<'a> {
+    /// Time, strictly increasing.
+    pub time_s: &'a [f64],
+    /// Speed of the disc, as logged or differentiated from its angle.
+    pub m2_speed_rad_s: Cow<'a, [f64]>,
+    /// Normal force.
+    pub normal_force_n: &'a [f64],
+    /// Friction torque.
+    pub friction_torque_nm: &'a [f64],
+}
+
+/// Force (or torque) in, position (or angle) out.
+#[derive(Debug, Clone, Copy)]
+pub struct DriveSignals<'a> {
+    /// Time, strictly increasing.
+    pub time_s: &'a [f64],
+    /// Newtons, or newton metres for a rotary drive.
+    pub effort: &'a [f64],
+    /// Metres, or radians for a rotary drive.
+    pub position: &'a [f64],
+}
+
+impl Log {
+    /// When two samples are too far apart to belong to one log.
+    pub const GAP_RULE: &'static str =
+        "steps up to 6 ms, and any step up to 10 times the 90th percentile of the log's steps";
+
+    /// Reads a log, Parquet if the name ends so, else CSV, and checks it.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let log = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
+            log_parquet::read(path)?
+        } else {
+            let bytes = std::fs::read(path).map_err(|e| InputError::io(path, "read", &e))?;
+            log_csv::parse(&path.display().to_string(), &bytes)?
+        };
+        log_check::check(&log)?;
+        Ok(log)
+    }
+
+    /// Parses and checks a CSV text; `source` is the name that errors will give.
+    pub fn parse_csv(source: &str, bytes: &[u8]) -> Result<Self, InputError> {
+        let log = log_csv::parse(source, bytes)?;
+        log_check::check(&log)?;
+        Ok(log)
+    }
+
+    /// The log as CSV: equal logs give equal bytes.
+    pub fn to_csv(&self) -> String {
+        log_csv::write(self)
+    }
+
+    /// The log as the bytes of a Parquet file: equal logs give equal bytes.
+    pub fn to_parquet(&self) -> Result<Vec<u8>, InputError> {
+        log_parquet::write(self)
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.columns.first().map_or(0, |column| column.cells.len())
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A numeric column by its name.
+    pub fn numbers(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|column| column.name == name).and_then(|column| match &column.cells {
+            Cells::Numbers(values) => Some(values.as_slice()),
+            Cells::Text(_) => None,
+        })
+    }
+
+    /// A known column.
+    pub fn signal(&self, signal: Signal) -> Option<&[f64]> {
+        self.numbers(signal.column())
+    }
+
+    /// A known column that must be there; the error lists what is there instead.
+    pub fn require(&self, signal: Signal) -> Result<&[f64], InputError> {
+        self.signal(signal).ok_or_else(|| self.missing(&[signal]))
+    }
+
+    /// Time of each sample; empty only in a log made in memory without it.
+    pub fn time_s(&self) -> &[f64] {
+        self.signal(Signal::Time).unwrap_or_default()
+    }
+
+    /// The metadata value of a key.
+    pub fn metadata(&self, key: &str) -> Option<&str> {
+        self.metadata.iter().find(|(name, _)| name == key).map(|(_, value)| value.as_str())
+    }
+
+    /// Appends a numeric column, or replaces the one of this name.
+    pub fn set_numbers(&mut self, name: &str, values: Vec<f64>) {
+        match self.columns.iter_mut().find(|column| column.name == name) {
+            Some(column) => column.cells = Cells::Numbers(values),
+            None => self.columns.push(Column { name: name.into(), cells: Cells::Numbers(values) }),
+        }
+    }
+
+    /// Appends a known column, or replaces it.
+    pub fn set_signal(&mut self, signal: Signal, values: Vec<f64>) {
+        self.set_numbers(signal.column(), values);
+    }
+
+    /// Line in the file of a sample; sample + 1 where the log has no lines.
+    pub fn line_of(&self, sample: usize) -> u64 {
+        let after = self.line_marks.partition_point(|(first, _)| *first <= sample);
+        match after.checked_sub(1).and_then(|at| self.line_marks.get(at)) {
+            Some((first, line)) => line + (sample - first) as u64,
+            None => sample as u64 + 1,
+        }
+    }
+
+    /// What this log can be used for, from its columns.
+    ///
+    /// A log with a normal force or a friction torque is meant as a contact log. Else it is a drive log.
+    pub fn kind(&self) -> Result<LogKind, InputError> {
+        let has = |signal| self.signal(signal).is_some();
+        if has(Signal::NormalForce) || has(Signal::FrictionTorque) {
+            let motion = has(Signal::M2Speed) || has(Signal::M2Angle);
+            let mut missing: Vec<Signal> = if motion { vec![] } else { vec![Signal::M2Speed] };
+            missing.extend([Signal::NormalForce, Signal::FrictionTorque].into_iter().filter(|s| !has(*s)));
+            return if missing.is_empty() { Ok(LogKind::Contact) } else { Err(self.missing(&missing)) };
+        }
+        let (rotary, linear) = ([Signal::M2Torque, Signal::M2Angle], [Signal::Force, Signal::Position]);
+        if rotary.into_iter().all(has) {
+            Ok(LogKind::RotaryDrive)
+        } else if linear.into_iter().all(has) {
+            Ok(LogKind::LinearDrive)
+        } else if linear.into_iter().any(has) {
+            Err(self.missing(&linear.into_iter().filter(|s| !has(*s)).collect::<Vec<_>>()))
+        } else if has(Signal::M2Speed) {
+            Err(self.missing(&[Signal::NormalForce, Signal::FrictionTorque]))
+        } else {
+            let missing: Vec<Signal> = rotary.into_iter().filter(|s| !has(*s)).collect();
+            Err(self.missing(&missing))
+        }
+    }
+
+    /// The signals of a contact log. Speed is taken from the angle where there is no speed column:
+    /// the slope of the parabola through a sample and its neighbours.
+    pub fn contact(&self) -> Result<ContactSignals<'_>, InputError> {
+        let time_s = self.require(Signal::Time)?;
+        let missing: Vec<Signal> = [Signal::NormalForce, Signal::FrictionTorque]
+            .into_iter()
+            .filter(|signal| self.signal(*signal).is_none())
+            .collect();
+        let m2_speed_rad_s = match (self.signal(Signal::M2Speed), self.signal(Signal::M2Angle)) {
+            (Some(speed), _) => Cow::Borrowed(speed),
+            (None, Some(angle)) => Cow::Owned(slope(time_s, angle)),
+            (None, None) => return Err(self.missing(&[&[Signal::M2Speed], missing.as_slice()].concat())),
+        };
+        if !missing.is_empty() {
+            return Err(self.missing(&missing));
+        }
+        Ok(ContactSignals {
+            time_s,
+            m2_speed_rad_s,
+            normal_force_n: self.require(Signal::NormalForce)?,
+            friction_torque_nm: self.require(Signal::FrictionTorque)?,
+        })
+    }
+
+    /// The signals of a drive log (or of the drive in a contact log).
+    pub fn drive(&self) -> Result<DriveSignals<'_>, InputError> {
+        let linear = self.signal(Signal::Force).is_some() && self.signal(Signal::M2Torque).is_none();
+        let (effort, position) =
+            if linear { (Signal::Force, Signal::Position) } else { (Signal::M2Torque, Signal::M2Angle) };
+        Ok(DriveSignals {
+            time_s: self.require(Signal::Time)?,
+            effort: self.require(effort)?,
+            position: self.require(position)?,
+        })
+    }
+
+    fn missing(&self, missing: &[Signal]) -> InputError {
+        let wanted: Vec<String> = missing
+            .iter()
+            .map(|s| match s {
+                Signal::M2Speed => "m2_speed_rad_s (or m2_angle_rad)".to_string(),
+                s => s.column().to_string(),
+            })
+            .collect();
+        let there: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
+        let (word, verb) = if wanted.len() == 1 { ("column", "is") } else { ("columns", "are") };
+        InputError::new(format!("{word} {} {verb} missing", wanted.join(", ")))
+            .file(self.source.as_str())
+            .allowed(format!("this column in SI units; the file has {}", there.join(", ")))
+    }
+
+    /// Signals in the order in which the tool writes them, then all other columns.
+    pub fn sort_columns(&mut self) {
+        let rank = |name: &str| SIGNALS.iter().position(|s| s.column() == name).unwrap_or(SIGNALS.len());
+        self.columns.sort_by_key(|column| rank(&column.name));
+    }
+}
+
+/// Slope at each sample of the parabola through it and its neighbours; one-sided at the ends.
+fn slope(x: &[f64], y: &[f64]) -> Vec<f64> {
+    let secant = |i: usize| (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+    match x.len() {
+        0 | 1 => vec![0.0; x.len()],
+        2 => vec![secant(0); 2],
+        n => (0..n)
+            .map(|i| {
+                // Slopes left and right, each weighted with the other side's width.
+                let at = i.clamp(1, n - 2);
+                let (left, right) = (x[at] - x[at - 1], x[at + 1] - x[at]);
+                let (a, b) = (secant(at - 1), secant(at));
+                let curvature = (b - a) / (left + right);
+                (a * right + b * left) / (left + right) + 2.0 * curvature * (x[i] - x[at])
+            })
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_a_parabola_is_exact_on_uneven_samples() {
+        let x = [0.0, 0.1, 0.15, 0.4, 0.5];
+        let y: Vec<f64> = x.iter().map(|x| 3.0 * x * x - x).collect();
+        for (x, slope) in x.iter().zip(slope(&x, &y)) {
+            // Rounding of differences of order 0.1.
+            assert!((slope - (6.0 * x - 1.0)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! The files of the tool: logs, rigs, models, experiments, and how results are written.
+
+pub mod effect_id;
+pub mod experiment_file;
+pub mod log;
+mod log_check;
+mod log_csv;
+mod log_parquet;
+pub mod model_file;
+pub mod number;
+pub mod overrides;
+pub mod rig_file;
+pub mod signal;
+pub mod toml_tree;

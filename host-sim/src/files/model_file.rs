@@ -1,0 +1,389 @@
+//! The model file: which friction model, its parameters, and what `diagnose` added to it.
+//!
+//! `kind` names the model, `[parameters]` holds its numbers with their units in their names (stiffness
+//! and damping are those of all three elements together), `[intervals]` may hold what `fit` found about
+//! their uncertainty, and each `[[extension]]` has the `id` of an effect and its parameters.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use model_core::error::ParameterError;
+use model_core::friction::FrictionModel;
+use model_core::friction::brush::BrushParameters;
+use model_core::friction::lugre::LugreParameters;
+use model_core::friction::series::SeriesParameters;
+use model_core::friction::stribeck::StribeckParameters;
+
+use super::effect_id;
+use super::number;
+use super::overrides;
+use super::toml_tree::{Document, FINITE, NOT_NEGATIVE, TableReader};
+use crate::input_error::InputError;
+
+/// Which friction model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ModelKind {
+    /// Brush element with reset.
+    Brush,
+    /// LuGre.
+    Lugre,
+    /// LuGre with the bristle's speed in g, as printed.
+    ModifiedLugre,
+    /// Rubber block in series with LuGre bristles.
+    Series,
+}
+
+/// All kinds with their names in the file.
+pub const MODEL_KINDS: [(&str, ModelKind); 4] = [
+    ("brush", ModelKind::Brush),
+    ("lugre", ModelKind::Lugre),
+    ("modified_lugre", ModelKind::ModifiedLugre),
+    ("series", ModelKind::Series),
+];
+
+/// A parameter of a model: its name in the file, and its value where it may be left out.
+/// What is allowed is the model's own business and is checked by it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterSpec {
+    /// Name with unit.
+    pub name: &'static str,
+    /// Value where the file leaves it out; `None` must be there.
+    pub default: Option<f64>,
+}
+
+const fn required(name: &'static str) -> ParameterSpec {
+    ParameterSpec { name, default: None }
+}
+
+const fn optional(name: &'static str, default: f64) -> ParameterSpec {
+    ParameterSpec { name, default: Some(default) }
+}
+
+const SIGMA0: ParameterSpec = required("sigma0_n_per_m");
+const SIGMA1: ParameterSpec = optional("sigma1_n_s_per_m", 0.0);
+const A0: ParameterSpec = required("a0");
+const A1: ParameterSpec = required("a1");
+const A2: ParameterSpec = optional("a2_s_per_m", 0.0);
+const V0: ParameterSpec = required("v0_m_s");
+const DELTA: ParameterSpec = optional("delta", 0.5);
+const THETA: ParameterSpec = optional("theta", 1.0);
+const K_U: ParameterSpec = required("k_u_n_per_m");
+const C_U: ParameterSpec = required("c_u_n_s_per_m");
+
+const BRUSH: [ParameterSpec; 3] = [required("c_n_per_m"), required("mu_s"), required("mu_c")];
+const LUGRE: [ParameterSpec; 8] = [SIGMA0, SIGMA1, A0, A1, A2, V0, DELTA, THETA];
+const SERIES: [ParameterSpec; 10] = [SIGMA0, SIGMA1, A0, A1, A2, V0, DELTA, THETA, K_U, C_U];
+
+/// Any step size, to have the numbers checked.
+const SOME_STEP_S: f64 = 1e-4;
+
+impl ModelKind {
+    /// Name in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brush => "brush",
+            Self::Lugre => "lugre",
+            Self::ModifiedLugre => "modified_lugre",
+            Self::Series => "series",
+        }
+    }
+
+    /// Its parameters in the order of the file.
+    pub fn parameters(self) -> &'static [ParameterSpec] {
+        match self {
+            Self::Brush => &BRUSH,
+            Self::Lugre | Self::ModifiedLugre => &LUGRE,
+            Self::Series => &SERIES,
+        }
+    }
+}
+
+/// What `fit` found about a parameter's uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Standard deviation.
+    pub std: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end of the 95 % interval.
+    pub high: f64,
+}
+
+/// An effect added to the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extension {
+    /// Effect id, one of [`effect_id::EFFECTS`].
+    pub id: String,
+    /// Its parameters in the file's order, names with units.
+    pub parameters: Vec<(String, f64)>,
+}
+
+impl Extension {
+    /// A parameter of the extension.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.parameters.iter().find(|(key, _)| key == name).map(|(_, value)| *value)
+    }
+}
+
+/// A friction model with numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelFile {
+    /// The file as the user named it.
+    pub source: String,
+    /// Which model.
+    pub kind: ModelKind,
+    /// One value for each of [`ModelKind::parameters`], in that order.
+    values: Vec<f64>,
+    /// Uncertainties, where `fit` wrote them.
+    pub intervals: BTreeMap<String, Interval>,
+    /// Effects added by `diagnose`.
+    pub extensions: Vec<Extension>,
+}
+
+impl ModelFile {
+    /// A model with given parameters; those left out take their defaults.
+    pub fn new(source: &str, kind: ModelKind, parameters: &[(&str, f64)]) -> Result<Self, InputError> {
+        let refuse = |name: &str, problem: &str| InputError::new(problem).file(source).key(name);
+        if let Some((name, _)) =
+            parameters.iter().find(|(name, _)| !kind.parameters().iter().any(|s| s.name == *name))
+        {
+            let names: Vec<&str> = kind.parameters().iter().map(|spec| spec.name).collect();
+            return Err(refuse(name, "unknown parameter").allowed(names.join(", ")));
+        }
+        let mut values = Vec::new();
+        for spec in kind.parameters() {
+            let given = parameters.iter().find(|(name, _)| *name == spec.name).map(|(_, value)| *value);
+            values.push(given.or(spec.default).ok_or_else(|| refuse(spec.name, "is missing"))?);
+        }
+        let model =
+            Self { source: source.into(), kind, values, intervals: BTreeMap::new(), extensions: Vec::new() };
+        model.friction_model(SOME_STEP_S)?;
+        Ok(model)
+    }
+
+    /// The assumed rubber: the series model with the numbers of the assumed rig.
+    pub fn assumed(changes: &[(String, String)]) -> Result<Self, InputError> {
+        let mut document = Document::parse("assumed model", include_str!("../../models/assumed.toml"))?;
+        overrides::apply(&mut document, changes)?;
+        Self::from_root(&document.root(), "assumed model")
+    }
+
+    /// Reads and checks a file, with changes.
+    pub fn read(path: &Path, changes: &[(String, String)]) -> Result<Self, InputError> {
+        let mut document = Document::read(path)?;
+        overrides::apply(&mut document, changes)?;
+        Self::from_root(&document.root(), &path.display().to_string())
+    }
+
+    /// Reads a file, or takes the assumed model where none is given.
+    pub fn read_or_assumed(path: Option<&Path>, changes: &[(String, String)]) -> Result<Self, InputError> {
+        path.map_or_else(|| Self::assumed(changes), |path| Self::read(path, changes))
+    }
+
+    /// Parses and checks a text.
+    pub fn parse(source: &str, text: &str) -> Result<Self, InputError> {
+        Self::from_root(&Document::parse(source, text)?.root(), source)
+    }
+
+    fn from_root(root: &TableReader<'_>, source: &str) -> Result<Self, InputError> {
+        let names: Vec<&str> = MODEL_KINDS.iter().map(|(name, _)| *name).collect();
+        let kind =
+            root.choice("kind", &MODEL_KINDS)?.ok_or_else(|| root.missing("kind", &names.join(", ")))?;
+        let table =
+            root.table("parameters")?.ok_or_else(|| root.missing("parameters", "a table [parameters]"))?;
+        let mut values = Vec::new();
+        for spec in kind.parameters() {
+            let value = table.number(spec.name, FINITE)?.or(spec.default);
+            values.push(value.ok_or_else(|| table.missing(spec.name, "a finite number"))?);
+        }
+        table.finish()?;
+        let intervals = root.table("intervals")?.map(|table| read_intervals(&table, kind)).transpose()?;
+        let extensions = root.tables("extension")?.iter().map(read_extension).collect::<Result<_, _>>()?;
+        root.finish()?;
+        let intervals = intervals.unwrap_or_default();
+        let model = Self { source: source.into(), kind, values, intervals, extensions };
+        match model.build(SOME_STEP_S) {
+            Ok(_) => Ok(model),
+            Err(e) => Err(table.error(e.name, "out of range").allowed(e.allowed)),
+        }
+    }
+
+    /// A parameter by its name; `None` for a name this kind does not have.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.parameters().find(|(key, _)| *key == name).map(|(_, value)| value)
+    }
+
+    /// Changes a parameter; the model is unchanged where the name is unknown or the value out of range.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), InputError> {
+        let at = self.kind.parameters().iter().position(|spec| spec.name == name).ok_or_else(|| {
+            InputError::new("unknown parameter").file(self.source.as_str()).key(name).value(value)
+        })?;
+        let before = std::mem::replace(&mut self.values[at], value);
+        self.friction_model(SOME_STEP_S).map(|_| ()).inspect_err(|_| self.values[at] = before)
+    }
+
+    /// Names and values in the order of the file.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+        self.kind.parameters().iter().map(|spec| spec.name).zip(self.values.iter().copied())
+    }
+
+    /// The friction model with these numbers, without the extensions, prepared for a step size.
+    pub fn friction_model(&self, step_s: f64) -> Result<FrictionModel<f64>, InputError> {
+        self.build(step_s).map_err(|e| InputError::from(e).file(self.source.as_str()))
+    }
+
+    fn build(&self, step_s: f64) -> Result<FrictionModel<f64>, ParameterError> {
+        // A name that a kind does not have is never asked for below.
+        let value = |name| self.get(name).unwrap_or(f64::NAN);
+        let lugre = || LugreParameters {
+            sigma0_n_per_m: value("sigma0_n_per_m"),
+            sigma1_n_s_per_m: value("sigma1_n_s_per_m"),
+            a2_s_per_m: value("a2_s_per_m"),
+            stribeck: StribeckParameters {
+                a0: value("a0"),
+                a1: value("a1"),
+                v0_m_s: value("v0_m_s"),
+                delta: value("delta"),
+                theta: value("theta"),
+            },
+        };
+        match self.kind {
+            ModelKind::Brush => {
+                let (c_n_per_m, mu_s, mu_c) = (value("c_n_per_m"), value("mu_s"), value("mu_c"));
+                FrictionModel::brush(&BrushParameters { c_n_per_m, mu_s, mu_c }, step_s)
+            }
+            ModelKind::Lugre => FrictionModel::lugre(&lugre(), step_s),
+            ModelKind::ModifiedLugre => FrictionModel::modified_lugre(&lugre(), step_s),
+            ModelKind::Series => {
+                let (k_u_n_per_m, c_u_n_s_per_m) = (value("k_u_n_per_m"), value("c_u_n_s_per_m"));
+                FrictionModel::series(
+                    &SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles: lugre() },
+                    step_s,
+                )
+            }
+        }
+    }
+
+    /// The model as TOML.
+    pub fn to_toml(&self) -> String {
+        let mut text = format!("kind = \"{}\"\n\n[parameters]\n", self.kind.name());
+        for (name, value) in self.parameters() {
+            text += &format!("{name} = {}\n", toml_number(value));
+        }
+        if !self.intervals.is_empty() {
+            text += "\n# Standard deviation and 95 % interval of each fitted parameter.\n[intervals]\n";
+            for (name, Interval { std, low, high }) in &self.intervals {
+                let (std, low, high) = (toml_number(*std), toml_number(*low), toml_number(*high));
+                text += &format!("{name} = {{ std = {std}, low = {low}, high = {high} }}\n");
+            }
+        }
+        for extension in &self.extensions {
+            text += &format!("\n[[extension]]\nid = \"{}\"\n", extension.id);
+            for (name, value) in &extension.parameters {
+                text += &format!("{name} = {}\n", toml_number(*value));
+            }
+        }
+        text
+    }
+}
+
+/// A float that TOML reads as one.
+fn toml_number(value: f64) -> String {
+    let text = number::text(value);
+    if text.contains(['.', 'e']) { text } else { text + ".0" }
+}
+
+fn read_intervals(
+    table: &TableReader<'_>,
+    kind: ModelKind,
+) -> Result<BTreeMap<String, Interval>, InputError> {
+    let mut intervals = BTreeMap::new();
+    for spec in kind.parameters() {
+        let Some(entry) = table.table(spec.name)? else { continue };
+        let interval = Interval {
+            std: entry.required_number("std", NOT_NEGATIVE)?,
+            low: entry.required_number("low", FINITE)?,
+            high: entry.required_number("high", FINITE)?,
+        };
+        entry.finish()?;
+        intervals.insert(spec.name.to_string(), interval);
+    }
+    table.finish()?;
+    Ok(intervals)
+}
+
+fn read_extension(table: &TableReader<'_>) -> Result<Extension, InputError> {
+    let ids = || effect_id::EFFECTS.map(|(id, _)| id).join(", ");
+    let id = table.text("id")?.ok_or_else(|| table.missing("id", &ids()))?;
+    if effect_id::subsystem_of(id).is_none() {
+        return Err(table.error("id", "unknown effect").allowed(ids()));
+    }
+    let mut parameters = Vec::new();
+    for key in table.keys().filter(|key| *key != "id") {
+        if let Some(value) = table.number(key, FINITE)? {
+            parameters.push((key.to_string(), value));
+        }
+    }
+    Ok(Extension { id: id.into(), parameters })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LUGRE: &str =
+        "kind = \"lugre\"\n[parameters]\nsigma0_n_per_m = 1e6\na0 = 0.5\na1 = 0.7\nv0_m_s = 0.5\n";
+
+    #[test]
+    fn parameters_left_out_take_their_defaults() {
+        let model = ModelFile::parse("m.toml", LUGRE).unwrap();
+        assert_eq!((model.get("theta"), model.get("delta")), (Some(1.0), Some(0.5)));
+        assert_eq!((model.get("sigma1_n_s_per_m"), model.get("a2_s_per_m")), (Some(0.0), Some(0.0)));
+        assert_eq!(model.get("k_u_n_per_m"), None);
+    }
+
+    #[test]
+    fn a_model_written_reads_back_the_same() {
+        let mut model = ModelFile::parse("m.toml", LUGRE).unwrap();
+        model.intervals.insert("a0".into(), Interval { std: 0.01, low: 0.48, high: 0.52 });
+        model
+            .extensions
+            .push(Extension { id: "thermal_fade".into(), parameters: vec![("tau_s".into(), 3.0)] });
+        assert_eq!(ModelFile::parse("m.toml", &model.to_toml()).unwrap(), model);
+    }
+
+    #[test]
+    fn bad_models_are_named() {
+        let refused = |text: &str| ModelFile::parse("m.toml", text).unwrap_err().to_string();
+        assert_eq!(
+            refused(&LUGRE.replace("1e6", "-1e6")),
+            "m.toml:3: parameters.sigma0_n_per_m = -1e6: out of range; allowed: 1 to 1e10 N/m"
+        );
+        assert_eq!(
+            refused(&LUGRE.replace("a0 = 0.5\n", "")),
+            "m.toml:2: parameters.a0: is missing; allowed: a finite number"
+        );
+        assert_eq!(
+            refused(&LUGRE.replace("lugre", "dahl")),
+            "m.toml:1: kind = \"dahl\": not known; allowed: brush, lugre, modified_lugre, series"
+        );
+        assert!(
+            refused(&format!("{LUGRE}k_u_n_per_m = 3e4\n")).starts_with(
+                "m.toml:7: parameters.k_u_n_per_m = 3e4: unknown key; allowed: sigma0_n_per_m, "
+            )
+        );
+        assert!(refused(&format!("{LUGRE}[[extension]]\nid = \"rust\"\n")).starts_with(
+            "m.toml:8: extension.0.id = \"rust\": unknown effect; allowed: element_compliance, thermal_fade"
+        ));
+        let brush = "kind = \"brush\"\n[parameters]\nc_n_per_m = 3e4\nmu_s = 0.8\nmu_c = 0.9\n";
+        assert_eq!(
+            refused(brush),
+            "m.toml:4: parameters.mu_s = 0.8: out of range; allowed: mu_c <= mu_s <= 10"
+        );
+    }
+
+    #[test]
+    fn the_assumed_model_is_the_series_element() {
+        assert_eq!(ModelFile::assumed(&[]).unwrap().kind, ModelKind::Series);
+    }
+}
