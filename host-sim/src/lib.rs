@@ -2,5 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod diagnose;
 pub mod files;
 pub mod input_error;
