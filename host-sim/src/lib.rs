@@ -5,3 +5,5 @@ pub mod cli;
 pub mod diagnose;
 pub mod files;
 pub mod input_error;
+
+pub mod fit;
