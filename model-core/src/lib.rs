@@ -5,3 +5,4 @@ pub mod control;
 pub mod error;
 pub mod friction;
 pub mod real;
+pub mod selfcheck;

@@ -128,8 +128,10 @@ impl<T: Real> ModifiedLugre<T> {
             // u⁺ = carried + Δt (v − s),  s g(s) = gain u⁺
             Scheme::Implicit => {
                 let free = carried + self.step_s * v;
-                let s = self.root(gain * free, gain * self.step_s);
-                free - self.step_s * s
+                let held = gain * self.step_s;
+                let s = self.root(gain * free, held);
+                // Two forms of the same number; each is free of cancellation where it is used.
+                if held > T::ONE { s * self.stribeck.coefficient(s) / gain } else { free - self.step_s * s }
             }
             Scheme::Lagged => {
                 let g = self.stribeck.coefficient(v - state.rate_m_s);

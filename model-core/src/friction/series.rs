@@ -74,8 +74,9 @@ struct Load<T> {
     drive_n: T,
 }
 
-/// Newton or bisection steps; reached only where φ is flat to rounding.
-const MOST_ITERATIONS: u32 = 40;
+/// Newton steps, each followed by a bisection where it gained too little; reached only where φ is
+/// flat to rounding.
+const MOST_ITERATIONS: u32 = 30;
 
 impl<T: Real> Series<T> {
     /// Prepares the element for a step of `step_s` seconds, or names the parameter out of range.
@@ -168,39 +169,63 @@ impl<T: Real> Series<T> {
     }
 
     /// The root of φ that is reached from the last tip speed without crossing another.
+    ///
+    /// φ has a kink at v = 0, where its value is known without any function call. Newton would
+    /// jump to and fro across it, so the search keeps to the side on which the root lies.
     #[inline]
     fn solve(&self, state: &SeriesState<T>, load: &Load<T>) -> (T, Balance<T>) {
         let z = state.deflection_m;
         let tolerance = T::from_f64(4.0) * T::EPSILON * (load.drive_n.abs() + load.load_n);
+        let at_rest = self.lugre.sigma0 * z - load.drive_n;
         let mut v = state.tip_speed_m_s;
         let mut at = self.balance(z, load, v);
         if at.value.abs() <= tolerance {
             return (v, at);
         }
+        let rising = at.value < T::ZERO;
+        let crosses =
+            if rising { v < T::ZERO && at_rest < T::ZERO } else { v > T::ZERO && at_rest > T::ZERO };
+        if crosses {
+            v = if rising { T::ZERO } else { -T::ZERO };
+            at = self.balance(z, load, v);
+        }
         // |bristle force| never exceeds its stored or its steady value, so the root lies within.
-        let strongest = self.lugre.sigma0 * (z.abs() + load.reach_m * self.lugre.stribeck.largest());
-        let margin = (strongest + strongest * self.sigma1_per_step * self.lugre.inverse_sigma0)
-            * self.inverse_impedance;
+        let reach = self.lugre.sigma0 + self.sigma1_per_step;
+        let strongest = reach * (z.abs() + load.reach_m * self.lugre.stribeck.largest());
+        let margin = strongest * self.inverse_impedance;
         let centre = load.drive_n * self.inverse_impedance;
-        let (mut low, mut high) = (centre.at_most(T::ZERO) - margin, centre.at_least(T::ZERO) + margin);
+        let (mut low, mut high) = if rising {
+            (v, if v < T::ZERO { T::ZERO } else { centre.at_least(v) + margin })
+        } else {
+            (if v > T::ZERO { T::ZERO } else { centre.at_most(v) - margin }, v)
+        };
         for _ in 0..MOST_ITERATIONS {
-            if at.value > T::ZERO {
-                high = v;
-            } else {
-                low = v;
-            }
             let newton = v - at.value / at.slope;
             let next = if at.slope > T::ZERO && newton > low && newton < high {
                 newton
             } else {
                 T::HALF * (low + high)
             };
-            let moved = (next - v).abs();
+            let (last_value, moved) = (at.value, (next - v).abs());
             v = next;
             at = self.balance(z, load, v);
-            let settled = moved <= T::from_f64(2.0) * T::EPSILON * v.abs();
-            if at.value.abs() <= tolerance || settled {
+            if at.value.abs() <= tolerance || moved <= T::from_f64(2.0) * T::EPSILON * v.abs() {
                 break;
+            }
+            if at.value > T::ZERO {
+                high = v;
+            } else {
+                low = v;
+            }
+            if at.value.abs() > T::HALF * last_value.abs() {
+                // Newton gains too little here: halve the bracket instead.
+                v = T::HALF * (low + high);
+                at = self.balance(z, load, v);
+                if at.value > T::ZERO {
+                    high = v;
+                } else {
+                    low = v;
+                }
             }
         }
         (v, at)
