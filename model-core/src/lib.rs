@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 pub mod control;
 pub mod error;
+pub mod exponential;
 pub mod friction;
 pub mod real;
 pub mod selfcheck;

@@ -1,8 +1,10 @@
 //! The scalar of the models: `f32` on the chip, `f64` for reference.
 //!
-//! All transcendental functions come from `libm`, on the chip as on the PC, so that both compute
-//! the same bits. There is no fused multiply-add anywhere in the core for the same reason.
+//! All transcendental functions come from `libm` (the exponential in f32 from [`crate::exponential`]),
+//! on the chip as on the PC, so that both compute the same bits. There is no fused multiply-add
+//! anywhere in the core for the same reason.
 
+use crate::exponential;
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -98,7 +100,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($t:ty, $abs:ident, $sqrt:ident, $exp:ident, $expm1:ident, $ln:ident, $log1p:ident, $pow:ident,
+    ($t:ty, $exp:path, $exp_m1:path, $abs:ident, $sqrt:ident, $ln:ident, $log1p:ident, $pow:ident,
      $sin:ident, $cos:ident, $copysign:ident) => {
         impl Real for $t {
             const ZERO: Self = 0.0;
@@ -129,11 +131,11 @@ macro_rules! real {
             }
             #[inline]
             fn exp(self) -> Self {
-                libm::$exp(self)
+                $exp(self)
             }
             #[inline]
             fn exp_m1(self) -> Self {
-                libm::$expm1(self)
+                $exp_m1(self)
             }
             #[inline]
             fn ln(self) -> Self {
@@ -163,5 +165,5 @@ macro_rules! real {
     };
 }
 
-real!(f32, fabsf, sqrtf, expf, expm1f, logf, log1pf, powf, sinf, cosf, copysignf);
-real!(f64, fabs, sqrt, exp, expm1, log, log1p, pow, sin, cos, copysign);
+real!(f32, exponential::exp, exponential::exp_m1, fabsf, sqrtf, logf, log1pf, powf, sinf, cosf, copysignf);
+real!(f64, libm::exp, libm::expm1, fabs, sqrt, log, log1p, pow, sin, cos, copysign);
