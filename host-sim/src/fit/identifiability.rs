@@ -40,7 +40,7 @@ pub fn examine(scaled: &DMatrix<f64>) -> Identifiability {
     let norms: Vec<f64> = scaled.column_iter().map(|column| column.norm()).collect();
     let longest = norms.iter().copied().fold(0.0, f64::max);
     let without: Vec<usize> =
-        (0..norms.len()).filter(|&column| !(norms[column] > longest * NO_INFLUENCE)).collect();
+        (0..norms.len()).filter(|&column| norms[column] <= longest * NO_INFLUENCE).collect();
     if !without.is_empty() {
         return Identifiability::NoInfluence(without);
     }
