@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub mod covariance;
+pub mod drive;
 pub mod error;
 pub mod identifiability;
 pub mod least_squares;
