@@ -4,6 +4,6 @@
 pub mod cli;
 pub mod diagnose;
 pub mod files;
-pub mod input_error;
-
 pub mod fit;
+pub mod input_error;
+pub mod predict;

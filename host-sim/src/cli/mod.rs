@@ -4,6 +4,7 @@
 //! and one line in [`Command`] here.
 
 pub mod common;
+mod predict;
 
 pub mod progress;
 
@@ -35,6 +36,7 @@ struct Cli {
 macro_rules! commands {
     ($($(#[$meta:meta])* $name:ident($args:ty)),* $(,)?) => {
         #[derive(Subcommand)]
+        #[allow(clippy::large_enum_variant, reason = "made once")]
         enum Command {
             $($(#[$meta])* $name($args),)*
         }
@@ -49,7 +51,9 @@ macro_rules! commands {
     };
 }
 
-commands! {}
+commands! {
+    Predict(predict::Predict),
+}
 
 /// Runs the tool with the arguments of the process.
 pub fn main() -> ExitCode {

@@ -277,7 +277,7 @@ impl Log {
 }
 
 /// Slope at each sample of the parabola through it and its neighbours; one-sided at the ends.
-fn slope(x: &[f64], y: &[f64]) -> Vec<f64> {
+pub(crate) fn slope(x: &[f64], y: &[f64]) -> Vec<f64> {
     let secant = |i: usize| (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
     match x.len() {
         0 | 1 => vec![0.0; x.len()],

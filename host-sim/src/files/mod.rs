@@ -8,6 +8,7 @@ mod log_csv;
 mod log_parquet;
 pub mod model_file;
 pub mod number;
+pub mod output_dir;
 pub mod overrides;
 pub mod rig_file;
 pub mod signal;

@@ -111,6 +111,11 @@ impl<T: Real> Series<T> {
         self.k_u
     }
 
+    /// Block damping c_u, N·s/m.
+    pub fn damping_n_s_per_m(&self) -> T {
+        self.c_u
+    }
+
     /// Least block damping, N·s/m, for which the element has no fold at tip speed v:
     /// c_u > F_N |g′(v)|. Below it the element sticks and slips there.
     pub fn least_damping_n_s_per_m(&self, normal_force_n: T, tip_speed_m_s: T) -> T {
