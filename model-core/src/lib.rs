@@ -4,6 +4,7 @@
 pub mod control;
 pub mod error;
 pub mod exponential;
+pub mod extension;
 pub mod friction;
 pub mod real;
 pub mod selfcheck;

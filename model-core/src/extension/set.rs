@@ -1,0 +1,148 @@
+//! Any combination of effects, each at most once, addressed by the names of the model file.
+
+use super::adc_saturation::AdcSaturation;
+use super::bell_curve::BellCurve;
+use super::bridge_crosstalk::BridgeCrosstalk;
+use super::bridge_drift::BridgeDrift;
+use super::direction_asymmetry::DirectionAsymmetry;
+use super::disc_angle::DiscAngle;
+use super::encoder_eccentricity::EncoderEccentricity;
+use super::friction_delay::FrictionDelay;
+use super::load_dependence::LoadDependence;
+use super::ring_resonance::RingResonance;
+use super::rubber_relaxation::RubberRelaxation;
+use super::static_ageing::StaticAgeing;
+use super::thermal_fade::ThermalFade;
+use super::viscous_film::ViscousFilm;
+use super::wear_drift::WearDrift;
+use crate::error::ParameterError;
+use crate::real::Real;
+
+/// Most values that an effect has.
+pub const MOST_VALUES: usize = 13;
+
+macro_rules! effects {
+    ($($variant:ident, $field:ident, $type:ident, $id:literal, [$($step:ident)?];)*) => {
+        /// An effect of the library that extends the friction model.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Extension {
+            $(#[doc = concat!("`", $id, "`")] $variant,)*
+        }
+
+        impl Extension {
+            /// All of them, in the order of the model file's ids.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// Id in the model file.
+            pub const fn id(self) -> &'static str {
+                match self { $(Self::$variant => $id,)* }
+            }
+
+            /// Names of its parameters, in the order in which values are given.
+            pub const fn names(self) -> &'static [&'static str] {
+                match self { $(Self::$variant => $type::<f32>::NAMES,)* }
+            }
+        }
+
+        /// The effects of an extended model.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Extensions<T> {
+            $(pub(super) $field: Option<$type<T>>,)*
+            step_s: T,
+        }
+
+        impl<T: Real> Extensions<T> {
+            /// No effect, for a step of `step_s` seconds.
+            pub fn none(step_s: T) -> Self {
+                Self { $($field: None,)* step_s }
+            }
+
+            /// Adds an effect, or replaces it. A wrong number of values is refused like a value out of
+            /// range.
+            pub fn set(&mut self, extension: Extension, values: &[T]) -> Result<(), ParameterError> {
+                let wrong_count = ParameterError {
+                    name: extension.id(),
+                    value: values.len() as f64,
+                    allowed: "as many values as the effect has names",
+                };
+                #[allow(unused_variables)]
+                let step_s = self.step_s;
+                match extension {
+                    $(Extension::$variant => {
+                        let values = values.try_into().map_err(|_| wrong_count)?;
+                        self.$field = Some($type::new(values $(, { let $step = step_s; $step })?)?);
+                    })*
+                }
+                Ok(())
+            }
+
+            /// Whether an effect is there.
+            pub fn has(&self, extension: Extension) -> bool {
+                match extension { $(Extension::$variant => self.$field.is_some(),)* }
+            }
+        }
+    };
+}
+
+effects! {
+    ThermalFade, thermal_fade, ThermalFade, "thermal_fade", [];
+    WearDrift, wear_drift, WearDrift, "wear_drift", [];
+    DiscAngle, disc_angle, DiscAngle, "disc_angle", [];
+    LoadDependence, load_dependence, LoadDependence, "load_dependence", [];
+    StaticAgeing, static_ageing, StaticAgeing, "static_ageing", [];
+    DirectionAsymmetry, direction_asymmetry, DirectionAsymmetry, "direction_asymmetry", [];
+    BellCurve, bell_curve, BellCurve, "bell_curve", [];
+    RubberRelaxation, rubber_relaxation, RubberRelaxation, "rubber_relaxation", [];
+    ViscousFilm, viscous_film, ViscousFilm, "viscous_film", [];
+    BridgeCrosstalk, bridge_crosstalk, BridgeCrosstalk, "bridge_crosstalk", [];
+    BridgeDrift, bridge_drift, BridgeDrift, "bridge_drift", [];
+    FrictionDelay, friction_delay, FrictionDelay, "friction_delay", [step_s];
+    RingResonance, ring_resonance, RingResonance, "ring_resonance", [step_s];
+    EncoderEccentricity, encoder_eccentricity, EncoderEccentricity, "encoder_eccentricity", [];
+    AdcSaturation, adc_saturation, AdcSaturation, "adc_saturation", [];
+}
+
+impl<T: Real> Extensions<T> {
+    /// Changes the step size, s. The caller keeps it positive.
+    pub(super) fn set_step_s(&mut self, step_s: T) {
+        self.step_s = step_s;
+        if let Some(ring) = &mut self.ring_resonance {
+            ring.set_step_s(step_s);
+        }
+        if let Some(delay) = &mut self.friction_delay {
+            delay.set_step_s(step_s);
+        }
+    }
+
+    /// Step size, s.
+    pub(super) fn step_s(&self) -> T {
+        self.step_s
+    }
+}
+
+impl Extension {
+    /// The effect with an id.
+    pub fn with_id(id: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|extension| extension.id() == id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_is_found_by_its_id_and_refuses_a_wrong_number_of_values() {
+        let mut set = Extensions::none(1e-4f64);
+        for &extension in Extension::ALL {
+            assert_eq!(Extension::with_id(extension.id()), Some(extension));
+            assert!(extension.names().len() <= MOST_VALUES);
+            assert_eq!(set.set(extension, &[]).unwrap_err().name, extension.id());
+            assert!(!set.has(extension));
+        }
+        set.set(Extension::ViscousFilm, &[3.0]).unwrap();
+        assert!(set.has(Extension::ViscousFilm) && !set.has(Extension::WearDrift));
+        let error = set.set(Extension::ViscousFilm, &[-3.0]).unwrap_err();
+        assert_eq!((error.name, error.value), ("coefficient_n_s_per_m", -3.0));
+    }
+}
