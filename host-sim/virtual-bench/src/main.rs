@@ -1,0 +1,3 @@
+//! `cargo virtual-bench`.
+
+fn main() {}

@@ -1,0 +1,188 @@
+//! The whole part: which model answers for which instance, and what a reset leaves.
+//!
+//! A power-on reset rebuilds the emulator's part, which panics when asked for one. What is outside the chip
+//! stays through it: crystals, rails, the far ends of the serial ports, levels at pins, voltages at the
+//! converter's inputs, edges under way. So do the option bytes, which are flash.
+
+use super::adc_trigger::TriggeredAdc;
+use super::dac::Dac;
+use super::encoder_timer::EncoderTimer;
+use super::iwdg::Iwdg;
+use super::trigger_timer::TriggerTimer;
+use rigless::device::{Device, ErasedDevice, ResetCause};
+use rigless::mcu::Mcu;
+use rigless::soc::stm32h743::Stm32h743;
+use rigless::soc::stm32h743::peripherals::tim::{TIMERS, Timer};
+use rigless::soc::{Bus, Error};
+use rigless::store;
+use rigless::time::VirtualNanos;
+
+/// Rails of the NUCLEO board, and its clock sources: 8 MHz from the ST-LINK, and the 32 kHz crystal.
+const RAIL_MILLIVOLT: u32 = 3300;
+const HSE_HZ: u64 = 8_000_000;
+const LSE_HZ: u64 = 32_768;
+
+/// The motors, in the order in which everything here keeps two of a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motor {
+    /// M1: the pressing mechanism.
+    M1,
+    /// M2: the disc.
+    M2,
+}
+
+impl Motor {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::M1, Self::M2];
+
+    /// The timer that counts its encoder: TIM4 (16 bit) for M1, TIM2 (32 bit) for M2.
+    const fn encoder_timer(self) -> Timer {
+        match self {
+            Self::M1 => TIMERS[2],
+            Self::M2 => TIMERS[0],
+        }
+    }
+}
+
+/// Slots of the instances that have a model of ours, and of the serial port.
+#[derive(Debug, Clone, Copy)]
+struct Slots {
+    dac: usize,
+    iwdg: usize,
+    adc1: usize,
+    tim6: usize,
+    encoders: [usize; 2],
+    usart3: usize,
+}
+
+/// The part.
+#[derive(Debug)]
+pub struct Part {
+    /// The emulator's part, for everything that has no model of ours.
+    pub soc: Stm32h743,
+    /// DAC1.
+    pub dac: Dac,
+    /// The independent watchdog.
+    pub iwdg: Iwdg,
+    /// ADC1.
+    pub adc1: TriggeredAdc,
+    /// TIM6.
+    pub tim6: TriggerTimer,
+    /// The encoders' timers, by [`Motor`].
+    pub encoders: [EncoderTimer; 2],
+    slots: Slots,
+}
+
+store!(Part { values: [dac, iwdg, adc1, tim6, encoders], parts: [soc], built: [slots] });
+
+impl Part {
+    /// Index of USART3 among the emulator's serial ports.
+    pub const USART3: usize = 2;
+
+    /// The part out of a power-on reset, with nothing at its pins.
+    ///
+    /// # Errors
+    /// The emulator's description of the part lacks an instance.
+    pub fn new() -> Result<Self, Error> {
+        let mut soc = Stm32h743::new()?;
+        soc.rcc.attach_crystals(HSE_HZ, LSE_HZ);
+        soc.set_supply(RAIL_MILLIVOLT);
+        soc.set_analog_supply(RAIL_MILLIVOLT);
+        let bus = Mcu::bus(&soc);
+        let slots = Slots {
+            dac: bus.slot("DAC")?,
+            iwdg: bus.slot("IWDG")?,
+            adc1: bus.slot("ADC1")?,
+            tim6: bus.slot("TIM6")?,
+            encoders: [
+                bus.slot(Motor::M1.encoder_timer().instance)?,
+                bus.slot(Motor::M2.encoder_timer().instance)?,
+            ],
+            usart3: bus.slot("USART3")?,
+        };
+        Ok(Self {
+            soc,
+            dac: Dac::default(),
+            iwdg: Iwdg::default(),
+            adc1: TriggeredAdc::new(),
+            tim6: TriggerTimer::new(),
+            encoders: Motor::ALL.map(|motor| EncoderTimer::new(motor.encoder_timer())),
+            slots,
+        })
+    }
+
+    /// Asks for the part's supply to be cut or given back.
+    pub fn power(&mut self, at: VirtualNanos, on: bool) {
+        let (_, mut context) = self.soc.bus_mut().drive(at, self.slots.iwdg);
+        context.request_power(on);
+    }
+
+    /// The emulator's part anew, with what is outside the chip still there.
+    fn powered_on(&mut self) {
+        // It assembled once, from the same constant tables.
+        let Ok(mut fresh) = Stm32h743::new() else { return };
+        let (hse, lse) = self.soc.rcc.crystals();
+        fresh.rcc.attach_crystals(hse, lse);
+        fresh.set_supply(self.soc.pwr.supply());
+        fresh.set_analog_supply(self.soc.pwr.analog_supply());
+        let options = self.soc.flash.committed_options();
+        let (flash, registers) = fresh.program();
+        flash.keep_options(options, registers);
+        for (port, old) in fresh.usart.iter_mut().zip(&mut self.soc.usart) {
+            port.inherit(old);
+        }
+        for (port, old) in fresh.gpio.iter_mut().zip(&mut self.soc.gpio) {
+            *port = std::mem::take(old);
+            Device::reset(port);
+        }
+        self.soc = fresh;
+    }
+}
+
+impl Mcu for Part {
+    fn bus(&self) -> &Bus {
+        self.soc.bus()
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        self.soc.bus_mut()
+    }
+
+    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        match cause {
+            ResetCause::PowerOn => self.powered_on(),
+            _ => self.soc.reset(at, cause),
+        }
+        Device::reset(&mut self.dac);
+        Device::reset(&mut self.iwdg);
+        Device::reset(&mut self.adc1);
+        Device::reset(&mut self.tim6);
+        for encoder in &mut self.encoders {
+            Device::reset(encoder);
+        }
+    }
+
+    /// Only the serial port has something outside that the models do not hear of by themselves.
+    fn poll(&mut self, now: VirtualNanos) {
+        let slot = self.slots.usart3;
+        let (bus, model) = self.soc.split(slot);
+        let (registers, mut context) = bus.drive(now, slot);
+        if let Some(model) = model {
+            model.poll(registers, &mut context);
+        }
+    }
+
+    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        let Self { soc, dac, iwdg, adc1, tim6, encoders: [m1, m2], slots } = self;
+        let own: &mut dyn ErasedDevice = match slot {
+            _ if slot == slots.dac => dac,
+            _ if slot == slots.iwdg => iwdg,
+            _ if slot == slots.adc1 => adc1,
+            _ if slot == slots.tim6 => tim6,
+            _ if slot == slots.encoders[0] => m1,
+            _ if slot == slots.encoders[1] => m2,
+            _ => return soc.split(slot),
+        };
+        (soc.bus_mut(), Some(own))
+    }
+}
