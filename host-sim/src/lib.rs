@@ -7,3 +7,4 @@ pub mod files;
 pub mod fit;
 pub mod input_error;
 pub mod predict;
+pub mod summary;

@@ -1,6 +1,7 @@
 //! The files of the tool: logs, rigs, models, experiments, and how results are written.
 
 pub mod effect_id;
+mod experiment_core;
 pub mod experiment_file;
 pub mod log;
 mod log_check;
