@@ -1,0 +1,131 @@
+//! Writes a generated case to a folder: `train1.csv`, `train2.csv` …, `holdout.csv`, `rig.toml`,
+//! `model.toml`, and the answer in `truth.json`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+use rig_tests::{Base, Effect, Form, Plan, Scenario, generate};
+
+#[derive(Parser)]
+#[command(about = "Make logs with hidden effects")]
+struct Arguments {
+    /// Hidden effect, by its id; repeat for several, leave out for none
+    #[arg(long)]
+    effect: Vec<String>,
+    /// Decides every random draw
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Rate of the logs
+    #[arg(long, default_value_t = 1000.0)]
+    rate_hz: f64,
+    /// Factor on every sensor's noise
+    #[arg(long, default_value_t = 1.0)]
+    noise: f64,
+    /// Friction model behind the logs
+    #[arg(long, value_enum, default_value_t = BaseName::BySeed)]
+    base: BaseName,
+    /// What is logged
+    #[arg(long, value_enum, default_value_t = FormName::Contact)]
+    form: FormName,
+    /// Which motions are run
+    #[arg(long, value_enum, default_value_t = PlanName::Random)]
+    plan: PlanName,
+    /// Length of each log
+    #[arg(long, default_value_t = 20.0)]
+    duration_s: f64,
+    /// Relative error of the rig file
+    #[arg(long, default_value_t = 0.0)]
+    rig_file_error: f64,
+    /// Add a surface temperature
+    #[arg(long)]
+    temperature: bool,
+    /// Folder to write to
+    #[arg(long)]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BaseName {
+    BySeed,
+    Lugre,
+    Series,
+    ModifiedLugre,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FormName {
+    Contact,
+    Drive,
+    LinearStage,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PlanName {
+    Random,
+    Paper,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), String> {
+    let effects = arguments
+        .effect
+        .iter()
+        .map(|id| {
+            let all = || Effect::ALL.iter().map(|e| e.id()).collect::<Vec<_>>().join(", ");
+            Effect::from_id(id).ok_or_else(|| format!("effect {id}: not one of {}", all()))
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let scenario = Scenario {
+        rate_hz: arguments.rate_hz,
+        noise_factor: arguments.noise,
+        base: match arguments.base {
+            BaseName::BySeed => Base::BySeed,
+            BaseName::Lugre => Base::Lugre,
+            BaseName::Series => Base::Series,
+            BaseName::ModifiedLugre => Base::ModifiedLugre,
+        },
+        form: match arguments.form {
+            FormName::Contact => Form::Contact,
+            FormName::Drive => Form::Drive,
+            FormName::LinearStage => Form::LinearStage,
+        },
+        plan: match arguments.plan {
+            PlanName::Random => Plan::Random,
+            PlanName::Paper => Plan::Paper,
+        },
+        duration_s: arguments.duration_s,
+        rig_file_error: arguments.rig_file_error,
+        temperature_sensor: arguments.temperature,
+        ..Scenario::new(&effects, arguments.seed)
+    };
+    let case = generate(&scenario).map_err(|error| error.to_string())?;
+    let truth = case.truth.to_json().map_err(|error| error.to_string())?;
+    std::fs::create_dir_all(&arguments.out).map_err(|e| format!("{}: {e}", arguments.out.display()))?;
+    let write = |name: &str, text: &str| {
+        let path = arguments.out.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
+    };
+    for (i, text) in case.train.iter().enumerate() {
+        write(&format!("train{}.csv", i + 1), text)?;
+    }
+    write("holdout.csv", &case.holdout)?;
+    for (name, text) in [("rig.toml", &case.rig_toml), ("model.toml", &case.model_toml)] {
+        if !text.is_empty() {
+            write(name, text)?;
+        }
+    }
+    write("truth.json", &truth)?;
+    let [friction, normal, drive] = case.truth.residual_to_noise;
+    println!("residual over noise: friction {friction:.1}, normal force {normal:.1}, drive {drive:.1}");
+    Ok(())
+}

@@ -1,0 +1,169 @@
+//! Names of the effects a log can hide.
+//!
+//! The first 27 are those a diagnosis is asked to name. The others are outside that list on purpose:
+//! the right answer to them is that nothing known explains the log.
+
+use serde::{Serialize, Serializer};
+
+/// Part of the rig that an effect sits in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Subsystem {
+    /// Elements on the disc.
+    Friction,
+    /// Sensors and their electronics.
+    Measurement,
+    /// M1, lever, foil springs.
+    Pressure,
+    /// M2, shaft, bearing.
+    Drive,
+}
+
+macro_rules! effects {
+    ($($(#[$doc:meta])* $name:ident, $id:literal, $subsystem:ident, $known:literal;)*) => {
+        /// An effect.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Effect { $($(#[$doc])* $name,)* }
+
+        impl Effect {
+            /// Every effect, the nameable ones first.
+            pub const ALL: &'static [Self] = &[$(Self::$name,)*];
+
+            /// Its name in files.
+            #[must_use]
+            pub fn id(self) -> &'static str {
+                match self { $(Self::$name => $id,)* }
+            }
+
+            /// Where it sits.
+            #[must_use]
+            pub fn subsystem(self) -> Subsystem {
+                match self { $(Self::$name => Subsystem::$subsystem,)* }
+            }
+
+            /// Whether it is one of the effects a diagnosis is asked to name.
+            #[must_use]
+            pub fn is_known(self) -> bool {
+                match self { $(Self::$name => $known,)* }
+            }
+        }
+    };
+}
+
+effects! {
+    /// An elastic block in series with the bristles that the baseline lacks.
+    ElementCompliance, "element_compliance", Friction, true;
+    /// µ falls with the heat of sliding.
+    ThermalFade, "thermal_fade", Friction, true;
+    /// µ changes with the distance slid.
+    WearDrift, "wear_drift", Friction, true;
+    /// µ varies round the disc.
+    DiscAngle, "disc_angle", Friction, true;
+    /// µ varies with the normal force.
+    LoadDependence, "load_dependence", Friction, true;
+    /// Breakaway grows with dwell.
+    StaticAgeing, "static_ageing", Friction, true;
+    /// µ depends on the direction.
+    DirectionAsymmetry, "direction_asymmetry", Friction, true;
+    /// Friction rises with speed before it falls.
+    BellCurve, "bell_curve", Friction, true;
+    /// The block creeps.
+    RubberRelaxation, "rubber_relaxation", Friction, true;
+    /// A film drags without regard to normal force.
+    ViscousFilm, "viscous_film", Friction, true;
+    /// The friction bridge sees normal force.
+    BridgeCrosstalk, "bridge_crosstalk", Measurement, true;
+    /// Zero or gain of a bridge drifts.
+    BridgeDrift, "bridge_drift", Measurement, true;
+    /// The friction channel comes late.
+    FrictionDelay, "friction_delay", Measurement, true;
+    /// The torque ring rings lower than stated.
+    RingResonance, "ring_resonance", Measurement, true;
+    /// The encoder's disc runs out of true.
+    EncoderEccentricity, "encoder_eccentricity", Measurement, true;
+    /// A channel clips.
+    AdcSaturation, "adc_saturation", Measurement, true;
+    /// Dry friction in the lever.
+    LeverHysteresis, "lever_hysteresis", Pressure, true;
+    /// The foil springs stiffen.
+    FoilHardening, "foil_hardening", Pressure, true;
+    /// M1 cogs.
+    M1Ripple, "m1_ripple", Pressure, true;
+    /// The shaft twists.
+    ShaftTorsion, "shaft_torsion", Drive, true;
+    /// The coupling has play.
+    Backlash, "backlash", Drive, true;
+    /// M2 cogs.
+    M2Ripple, "m2_ripple", Drive, true;
+    /// The bearing drags more in one direction.
+    BearingAsymmetry, "bearing_asymmetry", Drive, true;
+    /// The shaft gets a constant torque that nobody commanded.
+    TorqueOffset, "torque_offset", Drive, true;
+    /// The bearing's drag falls with speed near zero.
+    BearingStribeck, "bearing_stribeck", Drive, true;
+    /// The bearing gives before it slides.
+    Presliding, "presliding", Drive, true;
+    /// The motor obeys late.
+    DriveDelay, "drive_delay", Drive, true;
+    /// Outside: mains hum in the friction channel.
+    MainsHum, "mains_hum", Measurement, false;
+    /// Outside: µ jumps between two values at random times.
+    MuTelegraph, "mu_telegraph", Friction, false;
+    /// Outside: µ breathes at a rhythm of its own, whatever the motion does.
+    MuBreathing, "mu_breathing", Friction, false;
+    /// Outside: µ falls while the speed changes, in either sense.
+    ShakenContact, "shaken_contact", Friction, false;
+    /// Outside: µ depends on the distance since the last reversal.
+    ReversalMemory, "reversal_memory", Friction, false;
+    /// Outside: M1's torque monitor reads too much while M2 turns.
+    MonitorSpeedGain, "monitor_speed_gain", Pressure, false;
+    /// Outside: the disc's face runs out and moves the normal force.
+    DiscWobble, "disc_wobble", Pressure, false;
+    /// Outside: the normal bridge creeps after a change of load.
+    BridgeCreep, "bridge_creep", Pressure, false;
+    /// Outside: the bearing's drag grows with the normal force.
+    ThrustBearing, "thrust_bearing", Drive, false;
+    /// Outside: M2's torque constant falls with speed.
+    TorqueSag, "torque_sag", Drive, false;
+}
+
+impl Effect {
+    /// The effect called `id`.
+    #[must_use]
+    pub fn from_id(id: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|effect| effect.id() == id)
+    }
+
+    /// The effects a diagnosis is asked to name.
+    #[must_use]
+    pub fn known() -> Vec<Self> {
+        Self::ALL.iter().copied().filter(|effect| effect.is_known()).collect()
+    }
+
+    /// The effects outside that list.
+    #[must_use]
+    pub fn outside() -> Vec<Self> {
+        Self::ALL.iter().copied().filter(|effect| !effect.is_known()).collect()
+    }
+
+    /// Whether a drive without contact can show it.
+    #[must_use]
+    pub fn works_without_contact(self) -> bool {
+        self.subsystem() == Subsystem::Drive && self != Self::ThrustBearing
+    }
+
+    /// Whether two effects can be told apart in principle when both are there at once.
+    #[must_use]
+    pub fn goes_with(self, other: Self) -> bool {
+        use Effect::{BellCurve, DirectionAsymmetry, ElementCompliance, RubberRelaxation};
+        let both = |a, b| (self == a && other == b) || (self == b && other == a);
+        // The relaxing block needs a baseline with a block; the bell replaces the falling curve.
+        self != other && !both(ElementCompliance, RubberRelaxation) && !both(BellCurve, DirectionAsymmetry)
+    }
+}
+
+impl Serialize for Effect {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.id())
+    }
+}
