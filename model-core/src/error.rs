@@ -15,7 +15,14 @@ pub struct ParameterError {
 
 impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {} is not allowed; allowed: {}", self.name, self.value, self.allowed)
+        // A value that came as f32 is shown with the digits it was given, not with those of its widening.
+        #[allow(clippy::cast_possible_truncation)]
+        let narrow = self.value as f32;
+        if f64::from(narrow) == self.value {
+            write!(f, "{} = {} is not allowed; allowed: {}", self.name, narrow, self.allowed)
+        } else {
+            write!(f, "{} = {} is not allowed; allowed: {}", self.name, self.value, self.allowed)
+        }
     }
 }
 

@@ -1,6 +1,10 @@
 //! Friction models and the control core of the rubber-asphalt rig.
 #![no_std]
 #![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
 pub mod control;
 pub mod error;
 pub mod exponential;

@@ -3,6 +3,7 @@
 use super::config::ControlConfig;
 use super::fault::Fault;
 use super::numbered::numbered;
+use super::observer::ObserverModel;
 use super::sequencer::PreparedExperiment;
 
 /// A request, applied between two ticks by [`super::tick::apply`]. Large values are prepared outside the
@@ -24,7 +25,10 @@ pub enum Command<'a> {
     Tare,
     /// Take this experiment for the next start.
     LoadExperiment(&'a PreparedExperiment),
-    /// Swap the whole prepared configuration; only while disabled.
+    /// Let the observer run this model from now on.
+    SetModel(&'a ObserverModel),
+    /// Swap the whole prepared configuration; only while the drives are off. A tare and a loaded
+    /// experiment are forgotten: zeros and limits may have changed.
     SetConfig(&'a ControlConfig),
 }
 
@@ -35,7 +39,7 @@ numbered! {
         ArmSwitchNotReleased = 2, "The arm switch must be turned off and on again first.";
         FaultLatched = 3, "A fault is latched; clear it first.";
         CausePresent = 4, "The cause of a fault is still there.";
-        NotDisabled = 5, "This is possible only while the rig is disabled.";
+        NotDisabled = 5, "This is possible only while the drives are off.";
         NotArmed = 6, "This is possible only while the rig is armed and at rest.";
         NotRunning = 7, "No experiment is running.";
         NoExperiment = 8, "No experiment is loaded.";
@@ -59,5 +63,8 @@ pub struct Refused {
 impl Refused {
     pub(crate) const fn because(reason: Refusal) -> Self {
         Self { reason, fault: None }
+    }
+    pub(crate) const fn by_fault(reason: Refusal, fault: Option<Fault>) -> Self {
+        Self { reason, fault }
     }
 }

@@ -1,13 +1,44 @@
 //! The prepared configuration: settings turned into coefficients per tick.
 
-use super::settings::ControlSettings;
-use crate::error::{ParameterError, require};
+use super::bridge::{Bridge, Tare};
+use super::encoder::Encoder;
+use super::encoder_watch::{FreeWatch, SprungWatch};
+use super::guard::Guard;
+use super::m1::M1;
+use super::m2::M2;
+use super::observer::{Observer, ObserverModel};
+use super::outputs::{DAC_MAX, DAC_ZERO};
+use super::settings::{ControlSettings, DriveSettings};
+use super::speed::SpeedEstimator;
+use super::supervisor::Timing;
+use super::validate::validate;
+use crate::error::ParameterError;
+
+/// How long the disc must be still before it is at rest.
+const REST_TIME_S: f32 = 0.05;
+/// Half of a blink of a lamp.
+const BLINK_TIME_S: f32 = 0.25;
 
 /// What the step reads. Built by [`ControlSettings::build`] and swapped whole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlConfig {
     pub(crate) settings: ControlSettings,
-    pub(crate) boot_ticks: u32,
+    pub(crate) m1_encoder: Encoder,
+    pub(crate) m2_encoder: Encoder,
+    pub(crate) speed: SpeedEstimator,
+    pub(crate) friction_bridge: Bridge,
+    pub(crate) normal_bridge: Bridge,
+    pub(crate) tare: Tare,
+    pub(crate) m1: M1,
+    pub(crate) m2: M2,
+    pub(crate) m1_dac: Dac,
+    pub(crate) m2_dac: Dac,
+    pub(crate) m1_watch: SprungWatch,
+    pub(crate) m2_watch: FreeWatch,
+    pub(crate) guard: Guard,
+    pub(crate) timing: Timing,
+    pub(crate) observer: Observer,
+    pub(crate) blink_ticks: u64,
 }
 
 impl ControlSettings {
@@ -16,17 +47,98 @@ impl ControlSettings {
     /// # Errors
     /// The first setting outside its range, with the range.
     pub fn build(&self) -> Result<ControlConfig, ParameterError> {
-        let tick_s = require("tick_s", self.tick_s, (2e-5..=1e-3).contains(&self.tick_s), "20e-6 … 1e-3 s")?;
-        let boot_s = self.timing.boot_s;
-        let boot_s = require("timing.boot_s", boot_s, (0.0..=10.0).contains(&boot_s), "0 … 10 s")?;
-        Ok(ControlConfig { settings: *self, boot_ticks: (boot_s / tick_s) as u32 })
+        validate(self)?;
+        let dt = self.tick_s;
+        let ticks = |time_s: f32| (time_s / dt) as u32;
+        let w = &self.encoder_watch;
+        let m1_encoder =
+            Encoder::new(&self.m1_encoder, w.m1_max_speed_rad_s, w.m1_max_acceleration_rad_s2, dt);
+        let m2_encoder =
+            Encoder::new(&self.m2_encoder, w.m2_max_speed_rad_s, w.m2_max_acceleration_rad_s2, dt);
+        Ok(ControlConfig {
+            settings: *self,
+            m1_encoder,
+            m2_encoder,
+            speed: SpeedEstimator::new(
+                self.speed_loop.estimator_bandwidth_hz,
+                m2_encoder.rad_per_count(),
+                dt,
+            ),
+            friction_bridge: Bridge::new(&self.friction_bridge, dt),
+            normal_bridge: Bridge::new(&self.normal_bridge, dt),
+            tare: Tare::new(self),
+            m1: M1::new(self),
+            m2: M2::new(self),
+            m1_dac: Dac::new(&self.m1),
+            m2_dac: Dac::new(&self.m2),
+            m1_watch: SprungWatch::new(self, m1_encoder.rad_per_count()),
+            m2_watch: FreeWatch::new(self),
+            guard: Guard::new(self),
+            timing: Timing {
+                boot_ticks: ticks(self.timing.boot_s),
+                stop_ticks: ticks(self.timing.stop_timeout_s),
+                rest_ticks: ticks(REST_TIME_S),
+            },
+            observer: Observer::new(&self.observer, self.geometry.friction_radius_m, dt)?,
+            blink_ticks: u64::from(ticks(BLINK_TIME_S).max(1)),
+        })
     }
 }
 
 impl ControlConfig {
-    /// The settings it was built from.
+    /// The settings it was built from. A model set later by command is not among them.
     #[must_use]
     pub fn settings(&self) -> &ControlSettings {
         &self.settings
+    }
+
+    pub(crate) fn set_model(&mut self, model: &ObserverModel) {
+        self.observer.set_model(model);
+    }
+}
+
+/// Torque to DAC code: mid-scale is zero, 2048 codes are the rated torque.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Dac {
+    codes_per_nm: f32,
+}
+
+impl Dac {
+    fn new(drive: &DriveSettings) -> Self {
+        let codes_per_nm = f32::from(DAC_ZERO) / drive.rated_torque_nm;
+        Self { codes_per_nm: if drive.reversed { -codes_per_nm } else { codes_per_nm } }
+    }
+
+    /// The nearest code. Conversion to an integer saturates, and not a number gives 0 on its way to the safe code.
+    pub(crate) fn code(&self, torque_nm: f32) -> u16 {
+        if !torque_nm.is_finite() {
+            return DAC_ZERO;
+        }
+        let code = f32::from(DAC_ZERO) + torque_nm * self.codes_per_nm + 0.5;
+        // `as` rounds towards zero and saturates at both ends.
+        (code as u16).min(DAC_MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dac_has_its_zero_at_mid_scale_and_its_ends_at_the_rated_torque() {
+        let plain = Dac::new(&ControlSettings::default().m1);
+        let turned = Dac::new(&DriveSettings { reversed: true, ..ControlSettings::default().m1 });
+        for (torque_nm, code) in
+            [(0.0, 2048), (4.0, 3072), (-4.0, 1024), (8.0, 4095), (-8.0, 0), (1e9, 4095), (-1e9, 0)]
+        {
+            assert_eq!(plain.code(torque_nm), code, "{torque_nm}");
+        }
+        assert_eq!((turned.code(4.0), turned.code(-4.0)), (1024, 3072));
+        // Half a step of 3.9 mN·m rounds to the nearest code.
+        assert_eq!(
+            (plain.code(0.0019), plain.code(0.0020), plain.code(-0.0019), plain.code(-0.0021)),
+            (2048, 2049, 2048, 2047)
+        );
+        assert_eq!(plain.code(f32::NAN), DAC_ZERO);
     }
 }

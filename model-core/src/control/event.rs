@@ -49,6 +49,8 @@ pub enum EventKind {
     },
     /// A new configuration is in force.
     ConfigChanged,
+    /// The observer runs another model.
+    ModelChanged,
     /// Both bridges have new zeros, in codes.
     TareDone {
         /// Zero of the friction bridge.
@@ -56,6 +58,8 @@ pub enum EventKind {
         /// Zero of the normal force bridge.
         normal_zero_code: f32,
     },
+    /// A tare was broken off because the rig began to move.
+    TareAborted,
     /// The bridges read too far from zero to tare; nothing was changed.
     TareRefused {
         /// What the friction bridge read on average.

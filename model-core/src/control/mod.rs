@@ -4,24 +4,51 @@
 //! ([`settings::ControlSettings`]) are checked and prepared once by `build`. No allocation, no `f64` in the loop,
 //! no division by constants, no logging: what happened goes into a small queue of events ([`event`]).
 
+mod bridge;
+#[cfg(test)]
+mod closed_loop_tests;
 pub mod command;
 pub mod config;
+mod encoder;
+mod encoder_watch;
 pub mod event;
+pub mod experiment_error;
 pub mod fault;
+#[cfg(test)]
+mod fault_tests;
+mod guard;
 pub mod limit;
+mod m1;
+mod m2;
 mod numbered;
+pub mod observer;
 pub mod outputs;
+mod pi;
+mod reference;
 pub mod samples;
 pub mod sequencer;
+#[cfg(test)]
+mod sequencer_tests;
 pub mod settings;
+mod speed;
 pub mod supervisor;
+#[cfg(test)]
+mod supervisor_tests;
+#[cfg(test)]
+mod testbench;
 pub mod tick;
+mod torque_loop;
+pub mod validate;
+#[cfg(test)]
+mod validate_tests;
 
 pub use command::{Command, Refusal, Refused};
 pub use config::ControlConfig;
 pub use event::{Event, EventKind, Reason};
+pub use experiment_error::{ExperimentError, Motor};
 pub use fault::{Fault, FaultSet};
 pub use limit::{Limit, LimitSet};
+pub use observer::{ModelParameters, N_ELEMENTS, ObserverModel};
 pub use outputs::{DAC_MAX, DAC_ZERO, Leds, Outputs, Record};
 pub use samples::{AdcScan, Samples};
 pub use sequencer::{Experiment, M1Mode, M2Mode, PreparedExperiment, Segment, SequencerState, Shape};

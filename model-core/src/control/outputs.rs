@@ -4,6 +4,7 @@ use super::fault::{Fault, FaultSet};
 use super::limit::LimitSet;
 use super::sequencer::SequencerState;
 use super::supervisor::Mode;
+use fixed::types::I32F32;
 
 /// DAC code of zero torque: mid-scale of 12 bits.
 pub const DAC_ZERO: u16 = 2048;
@@ -36,7 +37,7 @@ impl Outputs {
 pub struct Leds {
     /// Green: nothing stands in the way of arming, or the rig is armed.
     pub ready: bool,
-    /// Yellow: the drives are enabled (steady: armed, blinking: an experiment runs). Keep clear.
+    /// Yellow: the drives are enabled (steady: armed; blinking: torque on). Keep clear.
     pub live: bool,
     /// Red: a fault is latched (steady), or the cause of one is there while disabled (blinking).
     pub fault: bool,
@@ -64,8 +65,9 @@ pub struct Record {
     pub m2_angle_rad: f32,
     /// Position of M2 in counts since the start.
     pub m2_count: i64,
-    /// Angle of M2 within its revolution, 0 … 1, exact to the count.
-    pub m2_revolution: f32,
+    /// Angle of M2 in turns since the start, to 2⁻³² of a turn however far it went; its fractional part is the place
+    /// on the disc.
+    pub m2_turns: I32F32,
     /// Speed the loop of M2 follows, after its slew limit; 0 in torque mode.
     pub m2_speed_ref_rad_s: f32,
     /// Estimated speed of M2.

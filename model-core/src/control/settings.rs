@@ -7,6 +7,11 @@
 //! `saturated_…`), and a broken or shorted wire is pulled outside that band (beyond `open_…`, `short_…`), so the
 //! three can be told apart. All codes are of a 16 bit converter, 0 … 65535 for 0 … 3.3 V.
 
+use super::observer::ModelParameters;
+use crate::friction::lugre::LugreParameters;
+use crate::friction::series::SeriesParameters;
+use crate::friction::stribeck::StribeckParameters;
+
 /// Everything that can be set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlSettings {
@@ -164,10 +169,14 @@ pub struct LimitSettings {
 /// Watch over encoders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EncoderWatchSettings {
-    /// Fastest motion there can be; faster is a jump.
-    pub max_speed_rad_s: f32,
-    /// Strongest acceleration there can be; more is a jump.
-    pub max_acceleration_rad_s2: f32,
+    /// Fastest motion of M1 there can be; faster is a jump.
+    pub m1_max_speed_rad_s: f32,
+    /// Strongest acceleration of M1 there can be; more is a jump.
+    pub m1_max_acceleration_rad_s2: f32,
+    /// Fastest motion of M2 there can be; faster is a jump.
+    pub m2_max_speed_rad_s: f32,
+    /// Strongest acceleration of M2 there can be; more is a jump.
+    pub m2_max_acceleration_rad_s2: f32,
     /// Torque beyond friction that surely turns M2.
     pub m2_breakaway_nm: f32,
     /// Change of torque that surely moves M1.
@@ -202,6 +211,8 @@ pub struct TimingSettings {
 /// Model observer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverSettings {
+    /// Model of the whole contact.
+    pub model: ModelParameters,
     /// Low-pass of the friction bridge's amplifier, second order, which the prediction passes too; 0: none.
     pub bridge_lowpass_hz: f32,
     /// Time constant of the residual's running mean square.
@@ -251,9 +262,13 @@ impl Default for ControlSettings {
                 persistence_ticks: 2,
             },
             encoder_watch: EncoderWatchSettings {
-                max_speed_rad_s: 60.0,
-                max_acceleration_rad_s2: 5000.0,
-                m2_breakaway_nm: 1.0,
+                // A step to the rated torque: 80 mrad with 120 Hz give 60 rad/s and 45 000 rad/s².
+                m1_max_speed_rad_s: 100.0,
+                m1_max_acceleration_rad_s2: 80_000.0,
+                // (8 + 12) N·m on 0.02 kg·m² are 1000 rad/s².
+                m2_max_speed_rad_s: 60.0,
+                m2_max_acceleration_rad_s2: 5000.0,
+                m2_breakaway_nm: 2.0,
                 m1_breakaway_nm: 0.8,
                 m2_free_speed_rad_s: 1.0,
                 m1_free_angle_rad: 0.02,
@@ -268,9 +283,27 @@ impl Default for ControlSettings {
                 stop_timeout_s: 3.0,
                 rest_speed_rad_s: 0.05,
             },
-            observer: ObserverSettings { bridge_lowpass_hz: 1000.0, residual_time_s: 0.1 },
+            observer: ObserverSettings {
+                model: default_model(),
+                bridge_lowpass_hz: 1000.0,
+                residual_time_s: 0.1,
+            },
         }
     }
+}
+
+/// The assumed contact: rubber block in series with LuGre bristles.
+fn default_model() -> ModelParameters {
+    ModelParameters::Series(SeriesParameters {
+        k_u_n_per_m: 3e4,
+        c_u_n_s_per_m: 160.0,
+        bristles: LugreParameters {
+            sigma0_n_per_m: 1.76e7,
+            sigma1_n_s_per_m: 0.0,
+            a2_s_per_m: 0.0,
+            stribeck: StribeckParameters { a0: 0.5, a1: 0.7, v0_m_s: 0.5, delta: 0.5, theta: 1.0 },
+        },
+    })
 }
 
 impl Default for DriveSettings {

@@ -1,0 +1,292 @@
+//! Each fault is raised once through the tick, and the outputs are safe in the tick that tells it.
+
+use super::testbench::{Bench, Tamper, friction_step, steady};
+use super::*;
+use std::boxed::Box;
+use std::vec::Vec;
+
+/// A fault, what makes it, and how many ticks after its beginning it must be latched.
+struct Case {
+    fault: Fault,
+    within_ticks: usize,
+    tamper: Tamper,
+}
+
+fn case(fault: Fault, within_ticks: usize, tamper: impl FnMut(&mut Samples) + 'static) -> Case {
+    Case { fault, within_ticks, tamper: Box::new(tamper) }
+}
+
+/// Keeps a counter at what it was when the tampering began, with its lowest bit flickering.
+fn stuck(which: fn(&mut Samples) -> &mut u32) -> impl FnMut(&mut Samples) {
+    let (mut held, mut n) = (None, 0);
+    move |s| {
+        let count = which(s);
+        n += 1;
+        *count = *held.get_or_insert(*count) ^ (n & 1);
+    }
+}
+
+fn add_ramp(which: fn(&mut Samples) -> &mut u32, per_tick_per_tick: u32) -> impl FnMut(&mut Samples) {
+    let (mut step, mut sum) = (0, 0_u32);
+    move |s| {
+        step += per_tick_per_tick;
+        sum = sum.wrapping_add(step);
+        let count = which(s);
+        *count = count.wrapping_add(sum);
+    }
+}
+
+/// Everything that samples can show, at 30 rpm under a light load. (fault, latched within how many ticks, cause)
+fn cases_at_speed() -> Vec<Case> {
+    std::vec![
+        case(Fault::EmergencyStop, 1, |s| s.emergency_stop = true),
+        case(Fault::M1DriveFault, 1, |s| s.m1_drive_fault = true),
+        case(Fault::M2DriveFault, 1, |s| s.m2_drive_fault = true),
+        case(Fault::AdcStalled, 2, |s| s.adc_fresh = false),
+        // Three scans lost are forgiven, the fourth is not.
+        case(Fault::AdcOverrun, 4, |s| s.adc_overrun = true),
+        case(Fault::FrictionBridgeOpen, 2, |s| s.adc.friction_bridge = 65535),
+        case(Fault::FrictionBridgeShort, 2, |s| s.adc.friction_bridge = 0),
+        case(Fault::FrictionBridgeSaturated, 2, |s| s.adc.friction_bridge = 65000),
+        case(Fault::NormalBridgeOpen, 2, |s| s.adc.normal_bridge = 65500),
+        case(Fault::NormalBridgeShort, 2, |s| s.adc.normal_bridge = 100),
+        case(Fault::NormalBridgeSaturated, 2, |s| s.adc.normal_bridge = 400),
+        case(Fault::M1EncoderJump, 1, |s| s.m1_count = s.m1_count.wrapping_add(10_000)),
+        // At 30 rpm there are 24 counts a tick: the first tick without them is a jump. (The count it sticks at is
+        // still right.)
+        case(Fault::M2EncoderJump, 2, stuck(|s| &mut s.m2_count)),
+        // The torque at rest in the moment of failure is near zero; then it may reach rated torque in 2 ms.
+        case(Fault::M1EncoderNoTorque, 1000, add_ramp(|s| &mut s.m1_count, 1)),
+        // Half a count a tick per tick is 650 rad/s² that nothing drives; the loop even brakes.
+        case(Fault::M2EncoderNoTorque, 200, every_other_ramp()),
+        case(Fault::OverSpeed, 2000, runaway()),
+        case(Fault::M1OverTorque, 2, |s| s.adc.m1_torque = 64_000),
+        case(Fault::M2OverTorque, 2, |s| s.adc.m2_torque = 1_000),
+        // The filter of 1.5 kHz takes a few ticks to 210 N, then two more.
+        case(Fault::OverForce, 6, |s| s.adc.normal_bridge = 64_500),
+        // 10 ms.
+        case(Fault::SupplyLow, 100, |s| s.adc.supply = 30_000),
+        case(Fault::SupplyHigh, 100, |s| s.adc.supply = 60_000),
+        // Five late ticks are forgiven, the sixth is not.
+        case(Fault::DeadlineBudget, 6, |s| s.deadline_missed = true),
+        // 0.5 s.
+        case(Fault::LinkLost, 5000, |s| s.link_heard = false),
+    ]
+}
+
+/// Counts that rise by half a count a tick per tick.
+fn every_other_ramp() -> impl FnMut(&mut Samples) {
+    let (mut n, mut sum) = (0, 0_u32);
+    move |s| {
+        n += 1;
+        sum = sum.wrapping_add(n / 2);
+        s.m2_count = s.m2_count.wrapping_add(sum);
+    }
+}
+
+/// A disc that runs away at 260 rad/s², from 24 counts a tick, with a torque that explains it.
+fn runaway() -> impl FnMut(&mut Samples) {
+    let (mut n, mut count) = (0, None);
+    move |s| {
+        n += 1;
+        let count = count.get_or_insert(s.m2_count);
+        s.m2_count = *count;
+        *count = count.wrapping_add(24 + n / 5);
+        s.adc.m2_torque = 32768 + 18_000;
+    }
+}
+
+/// Runs from the beginning of the tampering to the fault; gives the ticks it took.
+fn ticks_to_fault(bench: &mut Bench, case: Case) -> usize {
+    bench.tamper = Some(case.tamper);
+    for n in 1..=case.within_ticks {
+        let outputs = bench.tick();
+        let r = outputs.record;
+        if r.faults.is_empty() {
+            assert_eq!(r.mode, Mode::Running, "{:?}: {r:?}", case.fault);
+            continue;
+        }
+        assert!(r.faults.contains(case.fault), "{:?} and not {:?}", case.fault, r.fault);
+        assert_eq!(r.fault, Some(case.fault), "the first to be told");
+        assert!(outputs.is_safe(), "{:?}: not safe in the same tick", case.fault);
+        assert_eq!((r.mode, r.m1_torque_ref_nm, r.m2_torque_ref_nm), (Mode::Fault, 0.0, 0.0));
+        assert!(outputs.leds.fault && !outputs.leds.live && !outputs.leds.ready);
+        let told = |kind| bench.events.iter().any(|e| e.kind == kind && e.tick == r.tick);
+        assert!(told(EventKind::FaultLatched(case.fault)));
+        let reason = Reason::FaultLatched;
+        assert!(told(EventKind::ModeChanged { from: Mode::Running, to: Mode::Fault, reason }));
+        return n;
+    }
+    panic!("{:?} did not come within {} ticks", case.fault, case.within_ticks);
+}
+
+fn running_at_30_rpm() -> Bench {
+    let mut bench = Bench::new().running(&steady(0.5, M2Mode::Speed, 3.1, 20.0));
+    bench.run(0.5);
+    bench
+}
+
+/// Nothing moves by itself after the cause is gone, and the way back takes clearing, the switch and a command.
+fn comes_back_only_by_hand(bench: &mut Bench, fault: Fault) {
+    for _ in 0..500 {
+        assert!(bench.tick().is_safe());
+    }
+    bench.tamper = None;
+    for _ in 0..12_000 {
+        let outputs = bench.tick();
+        assert!(
+            outputs.is_safe() && outputs.record.mode == Mode::Fault && outputs.record.fault == Some(fault)
+        );
+    }
+    assert_eq!(bench.apply(Command::Arm), Err(Refused { reason: Refusal::FaultLatched, fault: Some(fault) }));
+    bench.apply(Command::ClearFault).unwrap();
+    assert!(bench.run(0.1).is_safe());
+    let refused = |reason| Err(Refused { reason, fault: None });
+    assert_eq!(bench.apply(Command::Arm), refused(Refusal::ArmSwitchNotReleased));
+    bench.arm_switch = false;
+    bench.run(0.01);
+    assert_eq!(bench.apply(Command::Arm), refused(Refusal::ArmSwitchOff));
+    bench.arm_switch = true;
+    assert!(bench.run(0.01).is_safe());
+    bench.apply(Command::Arm).unwrap();
+    assert_eq!(bench.tick().drive_enable, [true; 2]);
+}
+
+#[test]
+fn each_fault_that_samples_can_show_makes_safe_in_its_tick_and_stays_until_cleared_by_hand() {
+    for case in cases_at_speed() {
+        let (fault, mut bench) = (case.fault, running_at_30_rpm());
+        ticks_to_fault(&mut bench, case);
+        comes_back_only_by_hand(&mut bench, fault);
+    }
+}
+
+#[test]
+fn m1_without_counts_is_found_when_its_torque_changes() {
+    let mut bench = Bench::new().running(&friction_step(10.0));
+    bench.run(0.99);
+    // 10 ms to the step of the torque, 2 ms until it moved by 0.8 N·m, a window of 20 ms.
+    let found = ticks_to_fault(&mut bench, case(Fault::M1EncoderNoCounts, 330, stuck(|s| &mut s.m1_count)));
+    assert!(found > 300, "{found}");
+}
+
+#[test]
+fn m2_without_counts_is_found_when_it_is_pushed_from_rest() {
+    let mut bench = Bench::new().running(&steady(0.0, M2Mode::Torque, 3.0, 2.0));
+    // From the first tick on: 2 ms until 2 N·m, a window of 20 ms.
+    ticks_to_fault(&mut bench, case(Fault::M2EncoderNoCounts, 230, stuck(|s| &mut s.m2_count)));
+}
+
+#[test]
+fn a_value_that_is_not_a_number_makes_safe_in_its_tick() {
+    let mut bench = running_at_30_rpm();
+    bench.config.settings.m1.monitor_nm_per_code = f32::NAN;
+    ticks_to_fault(&mut bench, case(Fault::CalculationInvalid, 1, |_| ()));
+}
+
+#[test]
+fn what_is_found_at_the_start_is_latched_after_the_self_check() {
+    for (restart, intact, fault) in [
+        (Restart::Watchdog, true, Fault::WatchdogReset),
+        (Restart::Panic, true, Fault::Panic),
+        (Restart::HardFault, true, Fault::HardFault),
+        (Restart::Ordinary, false, Fault::SettingsCorrupt),
+    ] {
+        let mut bench = Bench::new();
+        bench.state = ControlState::after(&bench.config, restart, intact);
+        bench.arm_switch = true;
+        for _ in 0..2000 {
+            assert!(bench.tick().is_safe());
+        }
+        assert_eq!((bench.state.mode(), bench.state.restart()), (Mode::Fault, restart));
+        comes_back_only_by_hand(&mut bench, fault);
+    }
+}
+
+#[test]
+fn every_fault_is_raised_by_one_of_these_tests() {
+    let mut raised: Vec<Fault> = cases_at_speed().iter().map(|case| case.fault).collect();
+    raised.extend([Fault::M1EncoderNoCounts, Fault::M2EncoderNoCounts, Fault::CalculationInvalid]);
+    raised.extend([Fault::WatchdogReset, Fault::Panic, Fault::HardFault, Fault::SettingsCorrupt]);
+    raised.sort_by_key(|fault| fault.number());
+    assert_eq!(raised, Fault::ALL);
+}
+
+#[test]
+fn numbers_of_faults_limits_and_reasons_are_stable_and_come_back() {
+    // Logs and host tools know these numbers: new ones may be added, none may change.
+    let faults: Vec<u8> = Fault::ALL.iter().map(|x| x.number()).collect();
+    assert_eq!(faults[..5], [1, 2, 3, 4, 5]);
+    assert_eq!(faults[5..17], [8, 9, 10, 11, 12, 13, 16, 17, 18, 19, 20, 21]);
+    assert_eq!(faults[17..], [24, 25, 26, 27, 32, 33, 36, 37, 38, 40, 41, 42, 43]);
+    assert!(Limit::ALL.iter().map(|x| x.number()).eq(1..=10));
+    assert!(Reason::ALL.iter().map(|x| x.number()).eq(1..=11));
+    assert!(Refusal::ALL.iter().map(|x| x.number()).eq(1..=12));
+    assert!(Mode::ALL.iter().map(|x| x.number()).eq(0..=5));
+    assert_eq!((Fault::EmergencyStop.number(), Fault::HardFault.number()), (1, 43));
+    for &fault in Fault::ALL {
+        assert_eq!(Fault::from_number(fault.number()), Some(fault));
+        assert!(fault.sentence().ends_with('.'), "{fault}");
+    }
+    assert_eq!(Fault::from_number(63), None);
+}
+
+#[test]
+fn one_disturbed_sample_does_not_stop_the_rig() {
+    let disturb: [fn(&mut Samples); 6] = [
+        |s| s.adc.friction_bridge = 65535,
+        |s| s.adc.normal_bridge = 0,
+        |s| s.adc.m2_torque = 65535,
+        |s| s.adc.supply = 0,
+        |s| s.adc_fresh = false,
+        |s| s.deadline_missed = true,
+    ];
+    for disturb in disturb {
+        let mut bench = running_at_30_rpm();
+        bench.tamper = Some(Box::new(disturb));
+        bench.tick();
+        bench.tamper = None;
+        assert_eq!(bench.run(0.2).record.mode, Mode::Running);
+    }
+}
+
+#[test]
+fn late_ticks_are_forgiven_one_a_second() {
+    let mut bench = running_at_30_rpm();
+    let mut n = 0;
+    bench.tamper = Some(Box::new(move |s| {
+        n += 1;
+        s.deadline_missed = n % 10_100 == 0;
+    }));
+    let r = bench.run(15.0).record;
+    assert_eq!((r.mode, r.deadline_misses), (Mode::Running, 14));
+}
+
+#[test]
+fn while_disabled_a_cause_is_shown_and_hinders_arming_but_latches_nothing() {
+    let mut bench = Bench::new();
+    bench.run(0.2);
+    bench.tamper = Some(Box::new(|s| s.emergency_stop = true));
+    let r = bench.run(0.1).record;
+    assert_eq!((r.mode, r.fault, r.causes.first()), (Mode::Disabled, None, Some(Fault::EmergencyStop)));
+    bench.arm_switch = true;
+    bench.tick();
+    let refused = Refused { reason: Refusal::CausePresent, fault: Some(Fault::EmergencyStop) };
+    assert_eq!(bench.apply(Command::Arm), Err(refused));
+    bench.tamper = None;
+    bench.tick();
+    bench.apply(Command::Arm).unwrap();
+}
+
+#[test]
+fn further_faults_are_added_and_the_first_stays_the_first() {
+    let mut bench = running_at_30_rpm();
+    bench.tamper = Some(Box::new(|s| s.adc.supply = 60_000));
+    bench.run(0.02);
+    bench.tamper = Some(Box::new(|s| s.emergency_stop = true));
+    let r = bench.run(0.01).record;
+    assert_eq!(r.fault, Some(Fault::SupplyHigh));
+    assert_eq!(r.faults.iter().collect::<Vec<_>>(), [Fault::EmergencyStop, Fault::SupplyHigh]);
+    let refused = Refused { reason: Refusal::CausePresent, fault: Some(Fault::EmergencyStop) };
+    assert_eq!(bench.apply(Command::ClearFault), Err(refused));
+}

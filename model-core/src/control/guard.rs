@@ -1,0 +1,172 @@
+//! The guard: which causes of faults are there in this tick.
+//!
+//! It decides nothing; the supervisor latches. Levels that may flicker need some ticks in a row; events that must not
+//! pile up (late ticks, lost scans) fill a bucket that leaks one a second, and a bucket that runs over is a cause until
+//! it has leaked.
+
+use super::bridge::BridgeFailure;
+use super::encoder_watch::Loss;
+use super::fault::{Fault, FaultSet};
+use super::samples::Samples;
+use super::settings::ControlSettings;
+
+/// Coefficients of the guard.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Guard {
+    over_speed_rad_s: f32,
+    over_torque_nm: f32,
+    over_force_n: f32,
+    limit_ticks: u32,
+    supply_low_v: f32,
+    supply_high_v: f32,
+    supply_ticks: u32,
+    stall_ticks: u32,
+    overrun_budget: u32,
+    deadline_budget: u32,
+    leak_ticks: u32,
+    link_ticks: u32,
+}
+
+/// What the guard remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct GuardState {
+    m1_torque: u32,
+    m2_torque: u32,
+    force: u32,
+    supply_low: u32,
+    supply_high: u32,
+    stale: u32,
+    overruns: u32,
+    late: u32,
+    leak: u32,
+    silent: u32,
+    misses: u32,
+}
+
+/// What the guard looks at, in SI units.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sight {
+    pub(crate) speed_rad_s: f32,
+    pub(crate) m1_torque_nm: f32,
+    pub(crate) m2_torque_nm: f32,
+    pub(crate) normal_force_n: f32,
+    pub(crate) supply_v: f32,
+    pub(crate) friction_bridge: Option<BridgeFailure>,
+    pub(crate) normal_bridge: Option<BridgeFailure>,
+    pub(crate) m1_jump: bool,
+    pub(crate) m2_jump: bool,
+    pub(crate) m1_loss: Option<Loss>,
+    pub(crate) m2_loss: Option<Loss>,
+    /// The host must be heard.
+    pub(crate) link_needed: bool,
+}
+
+/// Counts ticks in a row and tells whether there were enough.
+fn lasts(count: &mut u32, present: bool, ticks: u32) -> bool {
+    *count = if present { count.saturating_add(1) } else { 0 };
+    present && *count >= ticks
+}
+
+impl Guard {
+    pub(crate) fn new(settings: &ControlSettings) -> Self {
+        let (l, s, t) = (&settings.limits, &settings.supply, &settings.timing);
+        let ticks = |time_s: f32| ((time_s / settings.tick_s) as u32).max(1);
+        Self {
+            over_speed_rad_s: l.over_speed_rad_s,
+            over_torque_nm: l.over_torque_nm,
+            over_force_n: l.over_force_n,
+            limit_ticks: l.persistence_ticks,
+            supply_low_v: s.low_v,
+            supply_high_v: s.high_v,
+            supply_ticks: ticks(s.persistence_s),
+            stall_ticks: t.adc_stall_ticks,
+            overrun_budget: t.adc_overrun_budget,
+            deadline_budget: t.deadline_budget,
+            leak_ticks: ticks(1.0),
+            link_ticks: ticks(t.link_timeout_s),
+        }
+    }
+
+    /// The causes of this tick.
+    pub(crate) fn step(&self, state: &mut GuardState, samples: &Samples, sight: &Sight) -> FaultSet {
+        let mut causes = FaultSet::EMPTY;
+        causes.insert_if(Fault::EmergencyStop, samples.emergency_stop);
+        causes.insert_if(Fault::M1DriveFault, samples.m1_drive_fault);
+        causes.insert_if(Fault::M2DriveFault, samples.m2_drive_fault);
+        self.time(state, samples, sight, &mut causes);
+        self.levels(state, sight, &mut causes);
+        insert_bridge(
+            &mut causes,
+            sight.friction_bridge,
+            [Fault::FrictionBridgeOpen, Fault::FrictionBridgeShort, Fault::FrictionBridgeSaturated],
+        );
+        insert_bridge(
+            &mut causes,
+            sight.normal_bridge,
+            [Fault::NormalBridgeOpen, Fault::NormalBridgeShort, Fault::NormalBridgeSaturated],
+        );
+        causes.insert_if(Fault::M1EncoderJump, sight.m1_jump);
+        causes.insert_if(Fault::M2EncoderJump, sight.m2_jump);
+        causes.insert_if(Fault::M1EncoderNoCounts, sight.m1_loss == Some(Loss::NoCounts));
+        causes.insert_if(Fault::M1EncoderNoTorque, sight.m1_loss == Some(Loss::NoTorque));
+        causes.insert_if(Fault::M2EncoderNoCounts, sight.m2_loss == Some(Loss::NoCounts));
+        causes.insert_if(Fault::M2EncoderNoTorque, sight.m2_loss == Some(Loss::NoTorque));
+        causes
+    }
+
+    fn time(&self, state: &mut GuardState, samples: &Samples, sight: &Sight, causes: &mut FaultSet) {
+        causes.insert_if(Fault::AdcStalled, lasts(&mut state.stale, !samples.adc_fresh, self.stall_ticks));
+        if samples.adc_overrun {
+            state.overruns = state.overruns.saturating_add(1).min(self.overrun_budget + 1);
+        }
+        if samples.deadline_missed {
+            state.misses = state.misses.saturating_add(1);
+            state.late = state.late.saturating_add(1).min(self.deadline_budget + 1);
+        }
+        causes.insert_if(Fault::AdcOverrun, state.overruns > self.overrun_budget);
+        causes.insert_if(Fault::DeadlineBudget, state.late > self.deadline_budget);
+        state.leak += 1;
+        if state.leak >= self.leak_ticks {
+            state.leak = 0;
+            state.overruns = state.overruns.saturating_sub(1);
+            state.late = state.late.saturating_sub(1);
+        }
+        let silent = sight.link_needed && !samples.link_heard;
+        causes.insert_if(Fault::LinkLost, lasts(&mut state.silent, silent, self.link_ticks));
+    }
+
+    #[allow(clippy::neg_cmp_op_on_partial_ord)]
+    fn levels(&self, state: &mut GuardState, sight: &Sight, causes: &mut FaultSet) {
+        let n = self.limit_ticks;
+        // Each comparison is written so that not-a-number counts as a violation.
+        let beyond = |value: f32, most: f32| !(libm::fabsf(value) <= most);
+        causes.insert_if(Fault::OverSpeed, beyond(sight.speed_rad_s, self.over_speed_rad_s));
+        let m1 = beyond(sight.m1_torque_nm, self.over_torque_nm);
+        causes.insert_if(Fault::M1OverTorque, lasts(&mut state.m1_torque, m1, n));
+        let m2 = beyond(sight.m2_torque_nm, self.over_torque_nm);
+        causes.insert_if(Fault::M2OverTorque, lasts(&mut state.m2_torque, m2, n));
+        let force = !(sight.normal_force_n <= self.over_force_n);
+        causes.insert_if(Fault::OverForce, lasts(&mut state.force, force, n));
+        let low = !(sight.supply_v >= self.supply_low_v);
+        causes.insert_if(Fault::SupplyLow, lasts(&mut state.supply_low, low, self.supply_ticks));
+        let high = sight.supply_v > self.supply_high_v;
+        causes.insert_if(Fault::SupplyHigh, lasts(&mut state.supply_high, high, self.supply_ticks));
+    }
+}
+
+impl GuardState {
+    /// Late ticks since the start.
+    pub(crate) fn deadline_misses(&self) -> u32 {
+        self.misses
+    }
+}
+
+fn insert_bridge(causes: &mut FaultSet, failure: Option<BridgeFailure>, faults: [Fault; 3]) {
+    let [open, short, saturated] = faults;
+    match failure {
+        None => {}
+        Some(BridgeFailure::Open) => causes.insert(open),
+        Some(BridgeFailure::Short) => causes.insert(short),
+        Some(BridgeFailure::Saturated) => causes.insert(saturated),
+    }
+}
