@@ -5,3 +5,7 @@
 //! compared is the same for all of them.
 
 pub mod analysis;
+pub mod noise;
+pub mod record;
+pub mod saturation;
+pub mod smooth;
