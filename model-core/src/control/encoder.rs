@@ -109,6 +109,11 @@ impl Encoder {
         state.turns as f32 * TAU + state.in_turn as f32 * self.rad_per_count
     }
 
+    /// Angle within the turn, 0 … 2π, exact to the count.
+    pub(crate) fn angle_in_turn_rad(&self, state: &EncoderState) -> f32 {
+        state.in_turn as f32 * self.rad_per_count
+    }
+
     /// Angle in turns, to 2⁻³² of a turn, however many turns there were.
     pub(crate) fn turns(&self, state: &EncoderState) -> I32F32 {
         let within = self.turns_per_count.wrapping_mul_int(u64::from(state.in_turn.unsigned_abs()));

@@ -1,10 +1,11 @@
 //! Model observer: what friction should be by the model, from measured speed and normal force, and what is left.
 //!
 //! Three elements touch the disc at 120°, so the model of the whole contact is split into [`N_ELEMENTS`] equal ones:
-//! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. Each has a
-//! state of its own, so effects that differ between them (the road's angle) have a place.
+//! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. Around
+//! the three stand the effects of [`crate::extension`] that a diagnosis added: they act on speed, load and friction
+//! coefficient of the contact, and on what the friction channel shows.
 //!
-//! predicted = r·Σ F_i, passed through a second order Butterworth low-pass like the bridge's amplifier, so that
+//! predicted = r·Σ F_i with its effects, passed through a second order Butterworth low-pass like the bridge's amplifier, so that
 //! measurement and prediction are late by the same time. residual = measured − predicted, with a running mean
 //! square (one pole; its root is taken by whoever shows it).
 //!
@@ -12,10 +13,11 @@
 
 use super::settings::ObserverSettings;
 use crate::error::ParameterError;
+use crate::extension::{ExtendedFriction, ExtendedInput, ExtendedState, Extensions};
 use crate::friction::brush::BrushParameters;
 use crate::friction::lugre::LugreParameters;
 use crate::friction::series::SeriesParameters;
-use crate::friction::{Contact, FrictionModel, FrictionState};
+use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
 use core::f32::consts::PI;
 
 /// Elements on the disc.
@@ -38,36 +40,61 @@ pub enum ModelParameters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverModel {
     element: FrictionModel<f32>,
+    around: ExtendedFriction<f32>,
 }
 
-impl ObserverModel {
-    /// Splits the model of the whole contact into elements and prepares them.
-    ///
-    /// # Errors
-    /// The parameter of an element that is out of its range.
-    pub fn new(whole: &ModelParameters, tick_s: f32) -> Result<Self, ParameterError> {
+impl ModelParameters {
+    fn prepare(&self, tick_s: f32) -> Result<FrictionModel<f32>, ParameterError> {
+        match self {
+            Self::Brush(p) => FrictionModel::brush(p, tick_s),
+            Self::Lugre(p) => FrictionModel::lugre(p, tick_s),
+            Self::ModifiedLugre(p) => FrictionModel::modified_lugre(p, tick_s),
+            Self::Series(p) => FrictionModel::series(p, tick_s),
+        }
+    }
+
+    /// One of [`N_ELEMENTS`] equal elements.
+    fn share(&self) -> Self {
         let share = 1.0 / N_ELEMENTS as f32;
         let bristles = |p: &LugreParameters<f32>| LugreParameters {
             sigma0_n_per_m: p.sigma0_n_per_m * share,
             sigma1_n_s_per_m: p.sigma1_n_s_per_m * share,
             ..*p
         };
-        let element = match whole {
-            ModelParameters::Brush(p) => {
-                FrictionModel::brush(&BrushParameters { c_n_per_m: p.c_n_per_m * share, ..*p }, tick_s)
-            }
-            ModelParameters::Lugre(p) => FrictionModel::lugre(&bristles(p), tick_s),
-            ModelParameters::ModifiedLugre(p) => FrictionModel::modified_lugre(&bristles(p), tick_s),
-            ModelParameters::Series(p) => FrictionModel::series(
-                &SeriesParameters {
-                    k_u_n_per_m: p.k_u_n_per_m * share,
-                    c_u_n_s_per_m: p.c_u_n_s_per_m * share,
-                    bristles: bristles(&p.bristles),
-                },
-                tick_s,
-            ),
-        }?;
-        Ok(Self { element })
+        match self {
+            Self::Brush(p) => Self::Brush(BrushParameters { c_n_per_m: p.c_n_per_m * share, ..*p }),
+            Self::Lugre(p) => Self::Lugre(bristles(p)),
+            Self::ModifiedLugre(p) => Self::ModifiedLugre(bristles(p)),
+            Self::Series(p) => Self::Series(SeriesParameters {
+                k_u_n_per_m: p.k_u_n_per_m * share,
+                c_u_n_s_per_m: p.c_u_n_s_per_m * share,
+                bristles: bristles(&p.bristles),
+            }),
+        }
+    }
+}
+
+impl ObserverModel {
+    /// Splits the model of the whole contact into elements and prepares them, without further effects.
+    ///
+    /// # Errors
+    /// The parameter that is out of its range.
+    pub fn new(whole: &ModelParameters, friction_radius_m: f32, tick_s: f32) -> Result<Self, ParameterError> {
+        Self::extended(whole, Extensions::none(tick_s), friction_radius_m)
+    }
+
+    /// The same with the effects of an extended model file, prepared for the control period.
+    ///
+    /// # Errors
+    /// The parameter that is out of its range.
+    pub fn extended(
+        whole: &ModelParameters,
+        effects: Extensions<f32>,
+        friction_radius_m: f32,
+    ) -> Result<Self, ParameterError> {
+        let tick_s = effects.step_s();
+        let around = ExtendedFriction::new(whole.prepare(tick_s)?, effects, friction_radius_m)?;
+        Ok(Self { element: whole.share().prepare(tick_s)?, around })
     }
 }
 
@@ -75,7 +102,6 @@ impl ObserverModel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Observer {
     model: ObserverModel,
-    friction_radius_m: f32,
     lowpass: Lowpass,
     averaging: f32,
 }
@@ -84,6 +110,7 @@ pub(crate) struct Observer {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverState {
     elements: [FrictionState<f32>; N_ELEMENTS],
+    around: ExtendedState<f32>,
     lowpass: LowpassState,
     mean_square: f32,
 }
@@ -103,8 +130,7 @@ impl Observer {
         tick_s: f32,
     ) -> Result<Self, ParameterError> {
         Ok(Self {
-            model: ObserverModel::new(&settings.model, tick_s)?,
-            friction_radius_m,
+            model: ObserverModel::new(&settings.model, friction_radius_m, tick_s)?,
             lowpass: Lowpass::new(settings.bridge_lowpass_hz, tick_s),
             averaging: -libm::expm1f(-tick_s / settings.residual_time_s),
         })
@@ -117,26 +143,30 @@ impl Observer {
     pub(crate) fn fresh(&self) -> ObserverState {
         ObserverState {
             elements: [self.model.element.rest(); N_ELEMENTS],
+            around: self.model.around.holding(0.0, &ExtendedInput::default(), 0.0),
             lowpass: LowpassState::default(),
             mean_square: 0.0,
         }
     }
 
-    /// One tick from measured speed of the disc, normal force and friction torque.
+    /// One tick from what was measured: motion, load, and the friction torque to compare with.
     pub(crate) fn step(
         &self,
         state: &mut ObserverState,
-        speed_rad_s: f32,
-        normal_force_n: f32,
+        measured: &ExtendedInput<f32>,
         friction_torque_nm: f32,
     ) -> Observed {
-        let contact =
-            Contact::new(speed_rad_s * self.friction_radius_m, normal_force_n * (1.0 / N_ELEMENTS as f32));
-        let mut force_n = 0.0;
-        for element in &mut state.elements {
-            force_n += self.model.element.step(element, &contact).force_n;
-        }
-        let predicted_nm = self.lowpass.step(&mut state.lowpass, force_n * self.friction_radius_m);
+        let (element, elements) = (&self.model.element, &mut state.elements);
+        let shown = self.model.around.step_around(&mut state.around, measured, |whole| {
+            let part = Contact { normal_force_n: whole.normal_force_n * (1.0 / N_ELEMENTS as f32), ..*whole };
+            let mut sum = FrictionForce::default();
+            for state in elements {
+                let one = element.step(state, &part);
+                sum = FrictionForce { force_n: sum.force_n + one.force_n, tip_speed_m_s: one.tip_speed_m_s };
+            }
+            sum
+        });
+        let predicted_nm = self.lowpass.step(&mut state.lowpass, shown.shown_nm);
         let residual_nm = friction_torque_nm - predicted_nm;
         state.mean_square += self.averaging * (residual_nm * residual_nm - state.mean_square);
         if !state.mean_square.is_finite() {
@@ -182,5 +212,124 @@ impl Lowpass {
         // The numerator is b0(1 + z⁻¹)², or 1 where everything passes.
         state.s2 = 0.5 * self.b1 * x - self.a2 * y;
         y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::settings::ControlSettings;
+    use super::*;
+    use crate::extension::Extension;
+    use core::f32::consts::TAU;
+
+    const TICK_S: f32 = 1e-4;
+
+    fn run(model: ObserverModel, lowpass_hz: f32, ticks: u32) -> Observed {
+        let settings = ControlSettings::default();
+        let s =
+            ObserverSettings { bridge_lowpass_hz: lowpass_hz, residual_time_s: 0.01, ..settings.observer };
+        let mut observer = Observer::new(&s, 0.06, TICK_S).unwrap();
+        observer.set_model(&model);
+        let mut state = observer.fresh();
+        let mut observed = Observed::default();
+        for k in 0..ticks {
+            let disc_angle_rad = (3.0 * TICK_S * k as f32) % TAU;
+            let measured = ExtendedInput { disc_speed_rad_s: 3.0, disc_angle_rad, normal_force_n: 88.0 };
+            observed = observer.step(&mut state, &measured, 4.0);
+        }
+        observed
+    }
+
+    /// LuGre slides steadily after microseconds: T = r F_N g(v).
+    fn lugre() -> ModelParameters {
+        let ModelParameters::Series(p) = ControlSettings::default().observer.model else { panic!() };
+        ModelParameters::Lugre(p.bristles)
+    }
+
+    fn steady_nm() -> f64 {
+        0.06 * 88.0 * (0.5 + 0.7 * (-(0.18_f64 / 0.5).sqrt()).exp())
+    }
+
+    #[test]
+    fn each_model_split_into_three_gives_the_friction_of_the_whole() {
+        let ModelParameters::Series(p) = ControlSettings::default().observer.model else { panic!() };
+        let brush = BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.9 };
+        for whole in [
+            ModelParameters::Series(p),
+            ModelParameters::Lugre(p.bristles),
+            ModelParameters::ModifiedLugre(p.bristles),
+            ModelParameters::Brush(brush),
+        ] {
+            let model = whole.prepare(TICK_S).unwrap();
+            let contact = Contact::new(0.18, 88.0);
+            // In the middle of the transient, where stiffness and damping count.
+            for ticks in [3, 50, 150] {
+                let (mut state, mut force_n) = (model.rest(), 0.0);
+                for _ in 0..ticks {
+                    force_n = model.step(&mut state, &contact).force_n;
+                }
+                let observed = run(ObserverModel::new(&whole, 0.06, TICK_S).unwrap(), 0.0, ticks);
+                // Rounding of a third, and the tolerance of the series element's root.
+                let error = (observed.predicted_nm - 0.06 * force_n).abs();
+                assert!(error < 1e-5 * 0.06 * 88.0, "{whole:?} {ticks}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_residual_is_what_was_measured_less_what_was_predicted() {
+        let observed = run(ObserverModel::new(&lugre(), 0.06, TICK_S).unwrap(), 0.0, 2000);
+        let expected = 4.0 - steady_nm();
+        assert!((f64::from(observed.predicted_nm) - steady_nm()).abs() < 1e-5);
+        assert!((f64::from(observed.residual_nm) - expected).abs() < 1e-5);
+        // 20 time constants of 10 ms.
+        assert!((f64::from(observed.mean_square_nm2) - expected * expected).abs() < 1e-5);
+    }
+
+    #[test]
+    fn effects_of_a_diagnosis_act_around_the_elements() {
+        let predicted = |extension: Extension, values: &[f32]| {
+            let mut effects = Extensions::none(TICK_S);
+            effects.set(extension, values).unwrap();
+            f64::from(run(ObserverModel::extended(&lugre(), effects, 0.06).unwrap(), 0.0, 2000).predicted_nm)
+        };
+        let crosstalk = predicted(Extension::BridgeCrosstalk, &[0.01]);
+        assert!((crosstalk - steady_nm() - 0.88).abs() < 1e-4, "0.01 N·m/N of 88 N: {crosstalk}");
+        let film = predicted(Extension::ViscousFilm, &[10.0]);
+        assert!((film - steady_nm() - 0.06 * 10.0 * 0.18).abs() < 1e-4, "r · 10 N·s/m · v: {film}");
+        let fade = predicted(Extension::ThermalFade, &[1e-2, 5.0, 0.5]);
+        assert!(fade < 0.99 * steady_nm(), "it heats up: {fade}");
+    }
+
+    #[test]
+    fn the_prediction_passes_a_butterworth_like_the_amplifiers() {
+        let lowpass = Lowpass::new(1000.0, TICK_S);
+        for (hz, gain) in [(10.0, 1.0), (1000.0, core::f32::consts::FRAC_1_SQRT_2), (4000.0, 0.013)] {
+            let mut state = LowpassState::default();
+            let mut largest = 0.0_f32;
+            for k in 0..20_000_u32 {
+                // A phase step that is no fraction of the period samples the whole sine.
+                let phase = TAU * ((k as f32 * hz * TICK_S) % 1.0);
+                let y = lowpass.step(&mut state, libm::sinf(phase));
+                largest = if k > 1000 { largest.max(y) } else { largest };
+            }
+            assert!((largest - gain).abs() < 0.04, "{hz} Hz: {largest}");
+        }
+        let mut state = LowpassState::default();
+        let all: [f32; 3] = [1.0, -2.0, 3.0];
+        assert_eq!(all.map(|x| Lowpass::new(0.0, TICK_S).step(&mut state, x)), all);
+    }
+
+    #[test]
+    fn a_model_that_leaves_the_numbers_starts_again_from_rest() {
+        let settings = ControlSettings::default();
+        let observer = Observer::new(&settings.observer, 0.06, TICK_S).unwrap();
+        let mut state = observer.fresh();
+        let fine = ExtendedInput { disc_speed_rad_s: 3.0, disc_angle_rad: 0.0, normal_force_n: 88.0 };
+        let broken = ExtendedInput { disc_speed_rad_s: f32::NAN, ..fine };
+        assert_eq!(observer.step(&mut state, &broken, 1.0), Observed::default());
+        for _ in 0..1000 {
+            assert!(observer.step(&mut state, &fine, 1.0).predicted_nm.is_finite());
+        }
     }
 }

@@ -25,6 +25,7 @@ use super::sequencer::{Demand, M2Mode, Sequencer, SequencerState};
 use super::speed::SpeedState;
 use super::supervisor::{Mode, Restart, Supervisor, Watch};
 use super::torque_loop::TorqueState;
+use crate::extension::ExtendedInput;
 
 /// Torque of M1 below which the contact counts as left alone, for a tare.
 const M1_AT_REST_NM: f32 = 0.2;
@@ -390,8 +391,12 @@ pub fn step(config: &ControlConfig, state: &mut ControlState, samples: &Samples)
     state.supervisor.step(&config.timing, watch, state.tick, &mut state.events);
     state.step_tare(config, samples);
     let (commands, limits) = state.step_loops(config, &m);
-    let observed =
-        config.observer.step(&mut state.observer, m.m2_speed_rad_s, m.normal.value, m.friction.value);
+    let measured = ExtendedInput {
+        disc_speed_rad_s: m.m2_speed_rad_s,
+        disc_angle_rad: config.m2_encoder.angle_in_turn_rad(&state.measuring.m2_encoder),
+        normal_force_n: m.normal.value,
+    };
+    let observed = config.observer.step(&mut state.observer, &measured, m.friction.value);
     let mode = state.mode();
     // Whatever the loops say, there is no torque and no enable but by the mode at the end of the tick.
     let commands = if mode.has_torque() { commands } else { [MotorCommand::default(); 2] };

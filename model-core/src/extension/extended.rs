@@ -11,7 +11,7 @@ use super::ring_resonance::{RingResonance, RingState};
 use super::set::Extensions;
 use super::wear_drift::Distance;
 use crate::error::{ParameterError, require};
-use crate::friction::{Contact, FrictionModel, FrictionState};
+use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
 use crate::real::Real;
 
 /// What is measured over one step.
@@ -140,6 +140,20 @@ impl<T: Real> ExtendedFriction<T> {
     /// Advances everything by one step.
     #[inline]
     pub fn step(&self, state: &mut ExtendedState<T>, input: &ExtendedInput<T>) -> ExtendedOutput<T> {
+        let mut friction = state.friction;
+        let output = self.step_around(state, input, |contact| self.friction.step(&mut friction, contact));
+        state.friction = friction;
+        output
+    }
+
+    /// The same around a contact that the caller computes: `contact_force` gives the friction force of all of it.
+    #[inline]
+    pub(crate) fn step_around(
+        &self,
+        state: &mut ExtendedState<T>,
+        input: &ExtendedInput<T>,
+        contact_force: impl FnOnce(&Contact<T>) -> FrictionForce<T>,
+    ) -> ExtendedOutput<T> {
         let effects = &self.effects;
         let step_s = effects.step_s();
         let piece = step_s + state.time_missing_s;
@@ -154,7 +168,7 @@ impl<T: Real> ExtendedFriction<T> {
             let creep = relaxation.advance(&mut state.creep_m, state.force_n, step_s);
             contact.sliding_speed_m_s = root_speed_m_s - creep;
         }
-        let friction = self.friction.step(&mut state.friction, &contact);
+        let friction = contact_force(&contact);
         state.force_n = friction.force_n;
         state.tip_speed_m_s = friction.tip_speed_m_s;
         if let Some(thermal) = &effects.thermal_fade {

@@ -115,7 +115,7 @@ impl<T: Real> Extensions<T> {
     }
 
     /// Step size, s.
-    pub(super) fn step_s(&self) -> T {
+    pub(crate) fn step_s(&self) -> T {
         self.step_s
     }
 }
