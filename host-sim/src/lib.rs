@@ -6,5 +6,6 @@ pub mod diagnose;
 pub mod files;
 pub mod fit;
 pub mod input_error;
+pub mod plant;
 pub mod predict;
 pub mod summary;

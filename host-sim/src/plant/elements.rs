@@ -1,0 +1,190 @@
+//! The three rubber elements that touch the disc, 120° apart, each with a third of stiffness and damping.
+//!
+//! Each is one of the friction models of the core, in `f64`. Where all three bear the same load they do the same,
+//! so one is integrated and its force taken three times: exact, and three times as fast.
+
+use model_core::error::ParameterError;
+use model_core::friction::brush::BrushParameters;
+use model_core::friction::lugre::LugreParameters;
+use model_core::friction::series::SeriesParameters;
+use model_core::friction::stribeck::StribeckParameters;
+use model_core::friction::{Contact, FrictionModel, FrictionState};
+
+/// Friction parameters of all elements together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ElementParameters {
+    /// Brush with reset.
+    Brush(BrushParameters<f64>),
+    /// LuGre.
+    Lugre(LugreParameters<f64>),
+    /// Modified LuGre as printed.
+    ModifiedLugre(LugreParameters<f64>),
+    /// Rubber block in series with LuGre bristles.
+    Series(SeriesParameters<f64>),
+}
+
+impl Default for ElementParameters {
+    /// The series element with the assumed numbers.
+    fn default() -> Self {
+        Self::Series(SeriesParameters {
+            k_u_n_per_m: 3e4,
+            c_u_n_s_per_m: 160.0,
+            bristles: LugreParameters {
+                sigma0_n_per_m: 1.76e7,
+                sigma1_n_s_per_m: 0.0,
+                a2_s_per_m: 0.0,
+                stribeck: StribeckParameters { a0: 0.5, a1: 0.7, v0_m_s: 0.5, delta: 0.5, theta: 1.0 },
+            },
+        })
+    }
+}
+
+impl ElementParameters {
+    /// Name of the kind, as in a model file.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Brush(_) => "brush",
+            Self::Lugre(_) => "lugre",
+            Self::ModifiedLugre(_) => "modified_lugre",
+            Self::Series(_) => "series",
+        }
+    }
+
+    /// Parameters of an element with this share of stiffness and damping.
+    #[must_use]
+    pub fn share(&self, share: f64) -> Self {
+        let lugre = |p: &LugreParameters<f64>| LugreParameters {
+            sigma0_n_per_m: p.sigma0_n_per_m * share,
+            sigma1_n_s_per_m: p.sigma1_n_s_per_m * share,
+            ..*p
+        };
+        match self {
+            Self::Brush(p) => Self::Brush(BrushParameters { c_n_per_m: p.c_n_per_m * share, ..*p }),
+            Self::Lugre(p) => Self::Lugre(lugre(p)),
+            Self::ModifiedLugre(p) => Self::ModifiedLugre(lugre(p)),
+            Self::Series(p) => Self::Series(SeriesParameters {
+                k_u_n_per_m: p.k_u_n_per_m * share,
+                c_u_n_s_per_m: p.c_u_n_s_per_m * share,
+                bristles: lugre(&p.bristles),
+            }),
+        }
+    }
+
+    /// The model, prepared for a step.
+    ///
+    /// # Errors
+    /// The parameter out of range.
+    pub fn model(&self, step_s: f64) -> Result<FrictionModel<f64>, ParameterError> {
+        match self {
+            Self::Brush(p) => FrictionModel::brush(p, step_s),
+            Self::Lugre(p) => FrictionModel::lugre(p, step_s),
+            Self::ModifiedLugre(p) => FrictionModel::modified_lugre(p, step_s),
+            Self::Series(p) => FrictionModel::series(p, step_s),
+        }
+    }
+
+    /// Stiffness that the disc feels while the elements stick.
+    pub(crate) fn sticking_stiffness_n_per_m(&self) -> f64 {
+        match self {
+            Self::Brush(p) => p.c_n_per_m,
+            Self::Lugre(p) | Self::ModifiedLugre(p) => p.sigma0_n_per_m,
+            Self::Series(p) => p.k_u_n_per_m,
+        }
+    }
+}
+
+/// The elements, prepared for a step size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Elements {
+    model: FrictionModel<f64>,
+    load_shares: [f64; 3],
+    equal: bool,
+}
+
+/// State of the elements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ElementsState {
+    pub(crate) element: [FrictionState<f64>; 3],
+    pub(crate) force_n: f64,
+    /// Tip speed of the first element, the root's where it has no block.
+    pub(crate) tip_speed_m_s: f64,
+}
+
+impl Elements {
+    pub(crate) fn new(
+        p: &ElementParameters,
+        load_shares: [f64; 3],
+        step_s: f64,
+    ) -> Result<Self, ParameterError> {
+        // The model's own ranges are those of all elements together, so that is what an error must name.
+        p.model(step_s)?;
+        let equal = load_shares.iter().all(|s| (s - 1.0 / 3.0).abs() < 1e-12);
+        Ok(Self { model: p.share(1.0 / 3.0).model(step_s)?, load_shares, equal })
+    }
+
+    pub(crate) fn rest(&self) -> ElementsState {
+        ElementsState { element: [self.model.rest(); 3], force_n: 0.0, tip_speed_m_s: 0.0 }
+    }
+
+    /// Moves the elements' roots at `speed_m_s` for one step under `normal_force_n` at its end.
+    #[inline]
+    pub(crate) fn step(&self, state: &mut ElementsState, speed_m_s: f64, normal_force_n: f64) -> f64 {
+        let third = Contact::new(speed_m_s, normal_force_n * self.load_shares[0]);
+        let first = self.model.step(&mut state.element[0], &third);
+        state.tip_speed_m_s = first.tip_speed_m_s;
+        state.force_n = if self.equal {
+            3.0 * first.force_n
+        } else {
+            let rest = state.element.iter_mut().zip(self.load_shares).skip(1);
+            rest.fold(first.force_n, |sum, (element, share)| {
+                sum + self.model.step(element, &Contact::new(speed_m_s, normal_force_n * share)).force_n
+            })
+        };
+        state.force_n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_equal_elements_do_what_one_with_all_the_stiffness_does() {
+        let step = 1e-4;
+        for p in [
+            ElementParameters::default(),
+            ElementParameters::Brush(BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 }),
+        ] {
+            let equal = Elements::new(&p, [1.0 / 3.0; 3], step).unwrap();
+            let each = Elements { equal: false, ..equal };
+            let whole = p.model(step).unwrap();
+            let (mut a, mut b, mut c) = (equal.rest(), each.rest(), whole.rest());
+            for k in 0..3000 {
+                let t = f64::from(k) * step;
+                let (v, n) = ((9.0 * t).sin() * 0.3, 60.0 + 40.0 * (31.0 * t).cos());
+                let forces = [
+                    equal.step(&mut a, v, n),
+                    each.step(&mut b, v, n),
+                    whole.step(&mut c, &Contact::new(v, n)).force_n,
+                ];
+                // Only rounding tells them apart; bristles multiply it by σ0/k_u ≈ 600.
+                assert!((forces[0] - forces[1]).abs() < 1e-7, "{forces:?} at {k}");
+                assert!((forces[0] - forces[2]).abs() < 1e-7, "{forces:?} at {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn unequal_loads_add_up_to_the_whole_in_steady_sliding() {
+        let step = 1e-4;
+        let p = ElementParameters::default();
+        let elements = Elements::new(&p, [0.5, 0.3, 0.2], step).unwrap();
+        let mut state = elements.rest();
+        for _ in 0..20_000 {
+            elements.step(&mut state, 0.3, 90.0);
+        }
+        let steady = 90.0 * (0.5 + 0.7 * (-(0.3f64 / 0.5).sqrt()).exp());
+        assert!((state.force_n / steady - 1.0).abs() < 1e-9, "{} against {steady}", state.force_n);
+    }
+}
