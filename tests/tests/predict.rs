@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use host_sim::files::log::Log;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
-use host_sim::predict::{ContactInputs, nrmse, simulate_friction};
+use host_sim::predict::{Accuracy, ContactInputs, StepPlan, nrmse, simulate_friction, simulate_planned};
 use rig_tests::driven_rig::{Curve, Law, RADIUS, Sample, Sensor, record};
 
 const CURVE: Curve = Curve { a0: 0.45, a1: 0.8, v0: 0.3 };
@@ -77,6 +77,25 @@ fn modified_lugre_logs_are_predicted() {
         );
         println!("modified {s:e}: nrmse {error:.2e}");
         assert!(error < ASKED, "{s:e}: {error:e}");
+    }
+}
+
+#[test]
+fn the_fast_plan_of_fits_is_good_to_a_few_parts_in_a_thousand() {
+    let (s, k, c) = (1.76e7, 3e4, 300.0);
+    let text = format!("sigma0_n_per_m = {s}\nk_u_n_per_m = {k}\nc_u_n_s_per_m = {c}");
+    let hard = at_10_khz(Law::Series { s, k, c }, None);
+    let soft = soft_lugre(|us| us % 100 == 0);
+    for (samples, model) in [(hard, model("series", &text)), (soft, model("lugre", "sigma0_n_per_m = 1e6"))] {
+        let log = Log::parse_csv("log", csv(&samples).as_bytes()).unwrap();
+        let (signals, rig) = (log.contact().unwrap(), rig(""));
+        let inputs = ContactInputs::new(&signals, &rig);
+        let element = model.friction_model(1e-4).unwrap();
+        let plan = StepPlan::new(&element, &rig.friction_bridge, &inputs, Accuracy::Fast);
+        let predicted = simulate_planned(&model, &rig, &inputs, &plan).unwrap();
+        let error = nrmse(signals.friction_torque_nm, &predicted).unwrap();
+        println!("{:?} fast: {} steps, nrmse {error:.2e}", model.kind, plan.steps());
+        assert!(error < 5e-3, "{error:e}");
     }
 }
 

@@ -21,8 +21,6 @@ use crate::input_error::InputError;
 const CHANGE_OF_G: f64 = 2e-3;
 /// Largest change of the load, relative, over a step.
 const CHANGE_OF_LOAD: f64 = 1e-2;
-/// Steps of a series element in the time c_u/k_u of its block.
-const STEPS_PER_BLOCK_TIME: f64 = 100.0;
 /// Longest step where a bridge follows: a tenth of the period of a mode of 400 Hz.
 const LONGEST_BRIDGE_STEP_S: f64 = 250e-6;
 /// Any step size, before the first step sets it.
@@ -38,18 +36,27 @@ const MOST_STEPS: f64 = 512.0;
 /// How finely an interval between samples is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Accuracy {
-    /// For fits, which run a model thousands of times: a few parts in a thousand at worst.
+    /// For fits, which run a model thousands of times: a few parts in a thousand.
     Fast,
-    /// Eight times finer.
+    /// For one prediction: below one part in a thousand, as far as the samples allow.
     #[default]
     Fine,
 }
 
 impl Accuracy {
+    /// How much finer than [`CHANGE_OF_G`] and the like.
     fn factor(self) -> f64 {
         match self {
             Self::Fast => 1.0,
             Self::Fine => 8.0,
+        }
+    }
+
+    /// Steps in the time c_u/k_u of a series element's block, which is stepped in first order.
+    fn steps_per_block_time(self) -> f64 {
+        match self {
+            Self::Fast => 25.0,
+            Self::Fine => 800.0,
         }
     }
 }
@@ -123,10 +130,12 @@ fn counts(
     };
     let bridge_s = if bridge.is_ideal() { f64::INFINITY } else { LONGEST_BRIDGE_STEP_S };
     let block_s = match model {
-        FrictionModel::Series(series) => series.damping_n_s_per_m() / series.stiffness_n_per_m(),
+        FrictionModel::Series(series) => {
+            series.damping_n_s_per_m() / series.stiffness_n_per_m() / accuracy.steps_per_block_time()
+        }
         _ => f64::INFINITY,
     };
-    let longest_s = bridge_s.min(block_s / STEPS_PER_BLOCK_TIME);
+    let longest_s = bridge_s.min(block_s);
     let coefficients: Vec<f64> = match stribeck {
         Some(stribeck) => inputs.sliding_speed_m_s.iter().map(|v| stribeck.coefficient(*v)).collect(),
         None => vec![1.0; inputs.len()],
@@ -145,11 +154,8 @@ fn counts(
             FrictionModel::ModifiedLugre(m) => turned.steps(v0, v1, step_s, m.largest_deflection_m(n1)),
             _ => 0.0,
         };
-        let steps = (step_s / longest_s)
-            .max(change / (g0.min(g1) * CHANGE_OF_G))
-            .max(load / CHANGE_OF_LOAD)
-            .max(bristles);
-        (steps * accuracy.factor()).ceil().clamp(1.0, MOST_STEPS) as u16
+        let finer = (change / (g0.min(g1) * CHANGE_OF_G)).max(load / CHANGE_OF_LOAD).max(bristles);
+        (step_s / longest_s).max(finer * accuracy.factor()).ceil().clamp(1.0, MOST_STEPS) as u16
     });
     counts.collect()
 }
