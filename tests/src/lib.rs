@@ -17,6 +17,7 @@ pub mod generate;
 pub mod laws;
 pub mod pressure;
 pub mod random;
+pub mod reference_rig;
 pub mod rig;
 pub mod scenario;
 pub mod sensors;
