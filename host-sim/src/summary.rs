@@ -27,6 +27,7 @@ use crate::files::experiment_file::{Course, ExperimentFile, Quantity, Segment, S
 use crate::files::log::Log;
 use crate::files::signal::Signal;
 use crate::input_error::InputError;
+use crate::predict::integral;
 
 mod decay;
 mod phase;
@@ -84,7 +85,7 @@ pub fn summarise(experiment: &ExperimentFile, log: &Log, run: RunFacts) -> Resul
     if let Some(segment) = last_m2.filter(|segment| segment.quantity != Quantity::SpeedRadS) {
         let angle = match log.signal(Signal::M2Angle) {
             Some(angle) => angle.to_vec(),
-            None => phase::integral(signals.time_s, &signals.m2_speed_rad_s),
+            None => integral(signals.time_s, &signals.m2_speed_rad_s),
         };
         match segment.course {
             Course::Sine { angular_frequency_rad_s, .. } => {

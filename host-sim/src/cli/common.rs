@@ -1,7 +1,14 @@
 //! Arguments that several subcommands share.
 
+use std::io::Write;
+
 use crate::files::overrides::Overrides;
 use crate::input_error::InputError;
+
+/// Prints a line on stdout. A reader that has gone away (`rig … | head`) is no error.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
 
 /// `--set`
 #[derive(clap::Args, Debug, Default)]

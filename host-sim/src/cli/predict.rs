@@ -5,14 +5,16 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::common::SetArgs;
+use super::common::{SetArgs, say};
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::input_error::InputError;
-use crate::predict::{Comparison, ContactInputs, predict_drive, predict_normal_force, simulate_friction};
+use crate::predict::{
+    Comparison, ContactInputs, effects_elsewhere, predict_drive, predict_normal_force, simulate_friction,
+};
 
 /// Drive a friction model with the measured inputs of a log; write measured, predicted, residual
 #[derive(clap::Args, Debug)]
@@ -31,7 +33,9 @@ Writes prediction.csv:
   normal_force_measured_n, ...     N, from M1's torque
   m2_torque_measured_nm, ...       N m, from inertia, bearing and measured friction, means over 10 ms
 and summary.json with the nrmse (RMS of the residual over RMS of the measured signal) of each subsystem:
-friction, pressure, drive.")]
+friction, pressure, drive.
+With --out X.parquet the table goes to X.parquet and the summary beside it.
+Effects of the model file that act on the contact or on the friction channel are applied.")]
 pub(super) struct Predict {
     /// Rig file (TOML); the assumed rig where left out
     #[arg(long, value_name = "RIG.toml")]
@@ -58,6 +62,8 @@ struct Summary {
     nrmse: BTreeMap<&'static str, Option<f64>>,
     /// Keys of the rig file that were left out and assumed.
     assumed: Vec<String>,
+    /// Effects of the model file that act on pressure or drive and are not in this prediction.
+    effects_not_applied: Vec<String>,
 }
 
 impl Predict {
@@ -103,16 +109,19 @@ impl Predict {
             simulated_s: span_s,
             nrmse,
             assumed: rig.assumed.clone(),
+            effects_not_applied: effects_elsewhere(&model),
         };
-        output.write("prediction.csv", table.to_csv())?;
+        output.write_table("prediction.csv", &table)?;
         output.write_json("summary.json", &summary)?;
+        let output_folder = output.folder().to_path_buf();
         output.finish()?;
         for (subsystem, nrmse) in &summary.nrmse {
             match nrmse {
-                Some(nrmse) => println!("{subsystem:9} nrmse {nrmse:.3e}"),
-                None => println!("{subsystem:9} nothing but zero was measured"),
+                Some(nrmse) => say(&format!("{subsystem:9} nrmse {nrmse:.3e}")),
+                None => say(&format!("{subsystem:9} nothing but zero was measured")),
             }
         }
+        say(&format!("written to {}", output_folder.display()));
         Ok(())
     }
 }

@@ -81,6 +81,8 @@ pub struct ContactSignals<'a> {
     pub time_s: &'a [f64],
     /// Speed of the disc, as logged or differentiated from its angle.
     pub m2_speed_rad_s: Cow<'a, [f64]>,
+    /// Angle of the disc, where it is logged.
+    pub m2_angle_rad: Option<&'a [f64]>,
     /// Normal force.
     pub normal_force_n: &'a [f64],
     /// Friction torque.
@@ -237,6 +239,7 @@ impl Log {
         Ok(ContactSignals {
             time_s,
             m2_speed_rad_s,
+            m2_angle_rad: self.signal(Signal::M2Angle),
             normal_force_n: self.require(Signal::NormalForce)?,
             friction_torque_nm: self.require(Signal::FrictionTorque)?,
         })

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use model_core::error::ParameterError;
+use model_core::extension::{Extension as CoreExtension, Extensions};
 use model_core::friction::FrictionModel;
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
@@ -319,9 +320,22 @@ fn read_extension(table: &TableReader<'_>) -> Result<Extension, InputError> {
         return Err(table.error("id", "unknown effect").allowed(ids()));
     }
     let mut parameters = Vec::new();
-    for key in table.keys().filter(|key| *key != "id") {
-        if let Some(value) = table.number(key, FINITE)? {
-            parameters.push((key.to_string(), value));
+    match CoreExtension::with_id(id) {
+        // An effect on the friction channel: the core says which parameters it has and checks them.
+        Some(effect) => {
+            let values = effect.names().iter().map(|name| table.required_number(name, FINITE));
+            let values: Vec<f64> = values.collect::<Result<_, _>>()?;
+            table.finish()?;
+            let checked = Extensions::none(SOME_STEP_S).set(effect, &values);
+            checked.map_err(|e| table.error(e.name, "out of range").allowed(e.allowed))?;
+            parameters.extend(effect.names().iter().map(|name| (*name).to_string()).zip(values));
+        }
+        None => {
+            for key in table.keys().filter(|key| *key != "id") {
+                if let Some(value) = table.number(key, FINITE)? {
+                    parameters.push((key.to_string(), value));
+                }
+            }
         }
     }
     Ok(Extension { id: id.into(), parameters })
@@ -346,9 +360,9 @@ mod tests {
     fn a_model_written_reads_back_the_same() {
         let mut model = ModelFile::parse("m.toml", LUGRE).unwrap();
         model.intervals.insert("a0".into(), Interval { std: 0.01, low: 0.48, high: 0.52 });
-        model
-            .extensions
-            .push(Extension { id: "thermal_fade".into(), parameters: vec![("tau_s".into(), 3.0)] });
+        let names = ["fade_per_j", "cooling_s", "curvature"];
+        let parameters = names.iter().zip([1e-3, 20.0, 0.5]).map(|(name, x)| (name.to_string(), x)).collect();
+        model.extensions.push(Extension { id: "thermal_fade".into(), parameters });
         assert_eq!(ModelFile::parse("m.toml", &model.to_toml()).unwrap(), model);
     }
 
@@ -375,6 +389,15 @@ mod tests {
         assert!(refused(&format!("{LUGRE}[[extension]]\nid = \"rust\"\n")).starts_with(
             "m.toml:8: extension.0.id = \"rust\": unknown effect; allowed: element_compliance, thermal_fade"
         ));
+        let film = format!("{LUGRE}[[extension]]\nid = \"viscous_film\"\n");
+        assert_eq!(
+            refused(&film),
+            "m.toml:7: extension.0.coefficient_n_s_per_m: is missing; allowed: a number, finite"
+        );
+        assert_eq!(
+            refused(&format!("{film}coefficient_n_s_per_m = -1\n")),
+            "m.toml:9: extension.0.coefficient_n_s_per_m = -1: out of range; allowed: 0 to 1e6 N s/m"
+        );
         let brush = "kind = \"brush\"\n[parameters]\nc_n_per_m = 3e4\nmu_s = 0.8\nmu_c = 0.9\n";
         assert_eq!(
             refused(brush),

@@ -16,8 +16,8 @@ use crate::input_error::InputError;
 #[derive(Debug)]
 pub struct OutputDir {
     target: PathBuf,
-    /// Name of the log and whether it is Parquet.
-    log_name: String,
+    /// Name of the main table where it is to be Parquet.
+    parquet_name: Option<String>,
     staging: Option<PathBuf>,
     /// Folders made on the way to the target, innermost last.
     made: Vec<PathBuf>,
@@ -25,17 +25,17 @@ pub struct OutputDir {
 }
 
 impl OutputDir {
-    /// Prepares `--out`: a folder, or `X.parquet`, which names the log in its folder.
+    /// Prepares `--out`: a folder, or `X.parquet`, which names the log (or other main table) in its folder.
     ///
     /// Everything that can be known to fail fails here, before the work is done.
     pub fn new(out: &Path) -> Result<Self, InputError> {
         let parquet = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-        let (target, log_name) = match (parquet, out.file_name()) {
+        let (target, parquet_name) = match (parquet, out.file_name()) {
             (true, Some(name)) => {
                 let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-                (parent.unwrap_or(Path::new(".")).to_path_buf(), name.to_string_lossy().into_owned())
+                (parent.unwrap_or(Path::new(".")).to_path_buf(), Some(name.to_string_lossy().into_owned()))
             }
-            _ => (out.to_path_buf(), "log.csv".to_string()),
+            _ => (out.to_path_buf(), None),
         };
         if target.as_os_str().is_empty() {
             return Err(InputError::new("is empty").file("--out").allowed("a folder"));
@@ -45,7 +45,7 @@ impl OutputDir {
                 InputError::in_file(&target, "is a file, not a folder").allowed("a folder for the results")
             );
         }
-        let mut output = Self { target, log_name, staging: None, made: Vec::new(), names: Vec::new() };
+        let mut output = Self { target, parquet_name, staging: None, made: Vec::new(), names: Vec::new() };
         output.make_folders()?;
         let staging = output.target.join(format!(".rig-{}", std::process::id()));
         fs::create_dir(&staging).map_err(|e| InputError::io(&output.target, "write into it", &e))?;
@@ -74,7 +74,7 @@ impl OutputDir {
 
     /// Where the log will be.
     pub fn log_path(&self) -> PathBuf {
-        self.target.join(&self.log_name)
+        self.target.join(self.parquet_name.as_deref().unwrap_or("log.csv"))
     }
 
     /// Adds a file.
@@ -95,12 +95,17 @@ impl OutputDir {
 
     /// Adds the log, as CSV or Parquet as `--out` says.
     pub fn write_log(&mut self, log: &Log) -> Result<(), InputError> {
-        let name = self.log_name.clone();
-        if name.to_ascii_lowercase().ends_with(".parquet") {
-            let bytes = log.to_parquet()?;
-            self.write(&name, bytes)
-        } else {
-            self.write(&name, log.to_csv())
+        self.write_table("log.csv", log)
+    }
+
+    /// Adds the main table of a command: under this name as CSV, or as the Parquet file that `--out` names.
+    pub fn write_table(&mut self, name: &str, table: &Log) -> Result<(), InputError> {
+        match self.parquet_name.clone() {
+            Some(parquet) => {
+                let bytes = table.to_parquet().map_err(|e| e.file(parquet.as_str()))?;
+                self.write(&parquet, bytes)
+            }
+            None => self.write(name, table.to_csv()),
         }
     }
 

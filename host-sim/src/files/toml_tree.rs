@@ -22,7 +22,7 @@ pub struct Allowed {
 }
 
 /// Any finite number.
-pub const FINITE: Allowed = Allowed { check: |_| true, words: "a finite number" };
+pub const FINITE: Allowed = Allowed { check: |_| true, words: "finite" };
 /// x > 0
 pub const POSITIVE: Allowed = Allowed { check: |x| x > 0.0, words: "> 0" };
 /// x ≥ 0
@@ -425,7 +425,7 @@ mod tests {
         let error = t.number("b", POSITIVE).unwrap_err();
         assert_eq!(error.to_string(), "f.toml:3: t.b = -2.5: out of range; allowed: > 0");
         let error = t.number("n", FINITE).unwrap_err();
-        assert_eq!(error.to_string(), "f.toml:4: t.n = nan: out of range; allowed: a finite number");
+        assert_eq!(error.to_string(), "f.toml:4: t.n = nan: out of range; allowed: finite");
     }
 
     #[test]

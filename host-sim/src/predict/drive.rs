@@ -8,6 +8,7 @@
 //! Left out: torsion, backlash and ripple; they are for `diagnose` to find.
 
 use super::Comparison;
+use super::inputs::integral;
 use crate::files::log::ContactSignals;
 use crate::files::rig_file::RigFile;
 
@@ -20,14 +21,14 @@ const STANDSTILL_RAD_S: f64 = 5e-3;
 pub fn predict_drive(rig: &RigFile, signals: &ContactSignals<'_>, m2_torque_nm: &[f64]) -> Comparison {
     let speed = &signals.m2_speed_rad_s;
     let mut windows = Windows::new(signals.time_s);
-    let torque = Integral::new(signals.time_s, m2_torque_nm);
-    let friction = Integral::new(signals.time_s, signals.friction_torque_nm);
-    let angle = Integral::new(signals.time_s, speed);
+    let torque = integral(signals.time_s, m2_torque_nm);
+    let friction = integral(signals.time_s, signals.friction_torque_nm);
+    let angle = integral(signals.time_s, speed);
     let mut comparison = Comparison::default();
     for i in 0..signals.time_s.len() {
         let (from, to) = windows.around(i);
         let span_s = signals.time_s[to] - signals.time_s[from];
-        let mean = |integral: &Integral| (integral.0[to] - integral.0[from]) / span_s;
+        let mean = |integral: &[f64]| (integral[to] - integral[from]) / span_s;
         let measured = mean(&torque);
         let mean_speed = mean(&angle);
         let smooth = rig.m2_inertia_kg_m2 * (speed[to] - speed[from]) / span_s
@@ -43,21 +44,6 @@ pub fn predict_drive(rig: &RigFile, signals: &ContactSignals<'_>, m2_torque_nm: 
         comparison.predicted.push(smooth + bearing);
     }
     comparison
-}
-
-/// Running integral by trapezia.
-struct Integral(Vec<f64>);
-
-impl Integral {
-    fn new(time_s: &[f64], values: &[f64]) -> Self {
-        let mut sum = 0.0;
-        let mut sums = vec![0.0];
-        for (t, x) in time_s.windows(2).zip(values.windows(2)) {
-            sum += 0.5 * (x[0] + x[1]) * (t[1] - t[0]);
-            sums.push(sum);
-        }
-        Self(sums)
-    }
 }
 
 /// Samples half a window before and after a sample, at least one each way where there is one.
@@ -106,6 +92,7 @@ mod tests {
         let signals = ContactSignals {
             time_s: &time_s,
             m2_speed_rad_s: Cow::Borrowed(&speed),
+            m2_angle_rad: None,
             normal_force_n: &friction,
             friction_torque_nm: &friction,
         };

@@ -11,6 +11,7 @@ use model_core::friction::stribeck::Stribeck;
 use model_core::friction::{Contact, FrictionModel, FrictionState};
 
 use super::bridge::BridgeModel;
+use super::extended;
 use super::inputs::ContactInputs;
 use crate::files::log::slope;
 use crate::files::model_file::ModelFile;
@@ -24,7 +25,7 @@ const CHANGE_OF_LOAD: f64 = 1e-2;
 /// Longest step where a bridge follows: a tenth of the period of a mode of 400 Hz.
 const LONGEST_BRIDGE_STEP_S: f64 = 250e-6;
 /// Any step size, before the first step sets it.
-const SOME_STEP_S: f64 = 1e-4;
+pub(super) const SOME_STEP_S: f64 = 1e-4;
 /// After a turn the bristles of the modified model, stepped in first order, get so many steps for each
 /// largest deflection that is slid, …
 const STEPS_PER_REACH: f64 = 20.0;
@@ -65,18 +66,20 @@ impl Accuracy {
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepPlan {
     /// Steps in each interval between samples.
-    counts: Vec<u16>,
-    steps: Vec<Step>,
+    pub(super) counts: Vec<u16>,
+    pub(super) steps: Vec<Step>,
 }
 
 /// One step of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Step {
-    length_s: f64,
+pub(super) struct Step {
+    pub(super) length_s: f64,
     /// Mean over the step.
-    speed_m_s: f64,
+    pub(super) speed_m_s: f64,
     /// At its end.
-    load_n: f64,
+    pub(super) load_n: f64,
+    /// Of the disc, at its end.
+    pub(super) angle_rad: f64,
 }
 
 impl StepPlan {
@@ -94,6 +97,7 @@ impl StepPlan {
         for (i, count) in counts.iter().enumerate() {
             let (parts, span_s) = (f64::from(*count), inputs.time_s[i + 1] - inputs.time_s[i]);
             let (speed, load) = (speed.piece(i), load.piece(i));
+            let (angle, next) = (inputs.disc_angle_rad[i], inputs.disc_angle_rad[i + 1]);
             let mut covered = 0.0;
             for part in 1..=*count {
                 let end = f64::from(part) / parts;
@@ -102,6 +106,7 @@ impl StepPlan {
                     length_s: span_s / parts,
                     speed_m_s: (area - covered) * parts,
                     load_n: load.at(end),
+                    angle_rad: angle + end * (next - angle),
                 });
                 covered = area;
             }
@@ -216,7 +221,8 @@ impl Piece {
     }
 }
 
-/// Friction torque (N·m) as the rig's friction bridge shows it, at each sample of the inputs.
+/// Friction torque (N·m) as the rig's friction bridge shows it, at each sample of the inputs, with the
+/// effects that extend the model.
 pub fn simulate_friction(
     model: &ModelFile,
     rig: &RigFile,
@@ -224,11 +230,15 @@ pub fn simulate_friction(
 ) -> Result<Vec<f64>, InputError> {
     let element = model.friction_model(SOME_STEP_S)?;
     let plan = StepPlan::new(&element, &rig.friction_bridge, inputs, Accuracy::Fine);
-    simulate_planned(model, rig, inputs, &plan)
+    if extended::acts_on_friction(model) {
+        extended::simulate(model, rig, inputs, &plan)
+    } else {
+        simulate_planned(model, rig, inputs, &plan)
+    }
 }
 
-/// As [`simulate_friction`] with a plan made before: for many runs with changing parameters, and so
-/// that the result is smooth in them.
+/// As [`simulate_friction`], without effects, with a plan made before: for many runs with changing
+/// parameters, and so that the result is smooth in them.
 pub fn simulate_planned(
     model: &ModelFile,
     rig: &RigFile,

@@ -13,6 +13,8 @@ pub struct ContactInputs {
     pub time_s: Vec<f64>,
     /// Sliding speed of the element's root over the road.
     pub sliding_speed_m_s: Vec<f64>,
+    /// Angle of the disc, as logged or integrated from its speed.
+    pub disc_angle_rad: Vec<f64>,
     /// Normal force.
     pub normal_force_n: Vec<f64>,
     /// Friction force at the first sample: what the element holds when the log begins.
@@ -31,6 +33,10 @@ impl ContactInputs {
         Self {
             time_s: signals.time_s.to_vec(),
             sliding_speed_m_s: signals.m2_speed_rad_s.iter().map(|speed| speed * radius_m).collect(),
+            disc_angle_rad: match signals.m2_angle_rad {
+                Some(angle) => angle.to_vec(),
+                None => integral(signals.time_s, &signals.m2_speed_rad_s),
+            },
             normal_force_n: ahead(signals.time_s, signals.normal_force_n, delay_s),
             initial_friction_n: first(signals.friction_torque_nm) / radius_m,
         }
@@ -47,9 +53,21 @@ impl ContactInputs {
     }
 }
 
-/// The signal at t + `delay_s` for each t, by straight lines; the last value where it has ended.
-pub(super) fn ahead(time_s: &[f64], values: &[f64], delay_s: f64) -> Vec<f64> {
-    if delay_s <= 0.0 {
+/// Running integral by trapezia, zero at the first sample.
+pub(crate) fn integral(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut sums = Vec::with_capacity(time_s.len());
+    sums.extend(time_s.first().map(|_| 0.0));
+    for (t, x) in time_s.windows(2).zip(values.windows(2)) {
+        sum += 0.5 * (x[0] + x[1]) * (t[1] - t[0]);
+        sums.push(sum);
+    }
+    sums
+}
+
+/// The signal at t + `ahead_s` for each t, by straight lines; its first and last value outside the log.
+pub(super) fn ahead(time_s: &[f64], values: &[f64], ahead_s: f64) -> Vec<f64> {
+    if ahead_s == 0.0 {
         return values.to_vec();
     }
     let mut after = 0;
@@ -66,7 +84,7 @@ pub(super) fn ahead(time_s: &[f64], values: &[f64], delay_s: f64) -> Vec<f64> {
             }
         }
     };
-    time_s.iter().map(|t| t + delay_s).map(at).collect()
+    time_s.iter().map(|t| t + ahead_s).map(at).collect()
 }
 
 #[cfg(test)]
@@ -74,12 +92,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_straight_line_is_taken_ahead_exactly_and_held_at_its_end() {
+    fn a_straight_line_is_moved_in_time_exactly_and_held_at_its_ends() {
         let time_s = [0.0, 0.1, 0.3, 0.35];
         let values = time_s.map(|t| 2.0 * t);
         let shifted = ahead(&time_s, &values, 0.04);
         for (value, t) in shifted.iter().zip([0.04, 0.14, 0.34, 0.35]) {
             // One rounding of each of three operations.
+            assert!((value - 2.0 * t).abs() < 1e-15, "{value} {t}");
+        }
+        let shifted = ahead(&time_s, &values, -0.2);
+        for (value, t) in shifted.iter().zip([0.0, 0.0, 0.1, 0.15]) {
             assert!((value - 2.0 * t).abs() < 1e-15, "{value} {t}");
         }
     }

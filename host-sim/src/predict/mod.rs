@@ -10,6 +10,7 @@
 
 mod bridge;
 mod drive;
+mod extended;
 mod friction;
 mod inputs;
 mod normal_force;
@@ -17,8 +18,10 @@ mod second_order;
 
 pub use bridge::BridgeModel;
 pub use drive::predict_drive;
+pub use extended::effects_elsewhere;
 pub use friction::{Accuracy, StepPlan, drive_contact, simulate_friction, simulate_planned};
 pub use inputs::ContactInputs;
+pub(crate) use inputs::integral;
 pub use normal_force::predict_normal_force;
 pub use second_order::SecondOrder;
 

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::phase::integral;
+use crate::predict::integral;
 
 /// After the step, the torque's own lag has died.
 const AFTER_STEP_S: f64 = 10e-3;

@@ -96,18 +96,6 @@ impl<'a> Phase<'a> {
     }
 }
 
-/// Running integral by trapezia.
-pub(super) fn integral(time_s: &[f64], values: &[f64]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let mut sums = Vec::with_capacity(time_s.len());
-    sums.extend(time_s.first().map(|_| 0.0));
-    for (t, x) in time_s.windows(2).zip(values.windows(2)) {
-        sum += 0.5 * (x[0] + x[1]) * (t[1] - t[0]);
-        sums.push(sum);
-    }
-    sums
-}
-
 /// Mean over whole periods, but the first where there are more, of ∮ torque dθ.
 pub(super) fn loop_energy(
     time_s: &[f64],
