@@ -1,0 +1,87 @@
+//! Telemetry: a row of SI values for each n-th control tick, and slow counters of the rig's health.
+//!
+//! A row holds what a line of the log needs. Positions travel as counts, so that the host's angles do
+//! not drift and lose no digit. Rows are numbered where the control tick offers them: a gap in the
+//! numbers is a lost row, whoever lost it.
+
+use serde::{Deserialize, Serialize};
+
+/// One row.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct TelemetryRow {
+    /// Number of the row since telemetry was switched on.
+    pub sequence: u32,
+    /// Control tick since the start of the firmware.
+    pub tick: u64,
+    /// Torque M1 is asked for.
+    pub m1_torque_ref_nm: f32,
+    /// Torque of M1 by its monitor.
+    pub m1_torque_nm: f32,
+    /// Position of M1.
+    pub m1_count: i64,
+    /// Torque M2 is asked for.
+    pub m2_torque_ref_nm: f32,
+    /// Torque of M2 by its monitor.
+    pub m2_torque_nm: f32,
+    /// Position of M2.
+    pub m2_count: i64,
+    /// Speed M2 is asked for.
+    pub m2_speed_ref_rad_s: f32,
+    /// Estimated speed of M2.
+    pub m2_speed_rad_s: f32,
+    /// Normal force.
+    pub normal_force_n: f32,
+    /// Friction torque.
+    pub friction_torque_nm: f32,
+    /// Friction torque the observer's model predicts.
+    pub predicted_friction_torque_nm: f32,
+    /// Supply voltage.
+    pub supply_v: f32,
+    /// Number of the mode.
+    pub mode: u8,
+    /// Number of the fault latched first, 0 for none.
+    pub fault: u8,
+    /// Limits that act, as a set of numbers.
+    pub limits: u16,
+    /// State of the sequencer.
+    pub sequencer: u8,
+    /// Ticks since the start of the experiment.
+    pub experiment_tick: u32,
+    /// Processor cycles from entry to exit of the last tick.
+    pub cycles: u32,
+}
+
+/// Counters and state, for a display and for a run's summary.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Health {
+    /// Control tick since the start of the firmware.
+    pub tick: u64,
+    /// Number of the mode.
+    pub mode: u8,
+    /// Number of the fault latched first, 0 for none.
+    pub fault: u8,
+    /// All latched faults, as a set of numbers.
+    pub faults: u64,
+    /// Causes of faults that are there now.
+    pub causes: u64,
+    /// Ticks that ended late.
+    pub deadline_misses: u32,
+    /// Scans that came late or not at all.
+    pub missed_scans: u32,
+    /// Cycles of the last tick.
+    pub cycles_last: u32,
+    /// Most cycles of a tick so far.
+    pub cycles_max: u32,
+    /// Least time from the trigger of the scan to the start of the tick, ns.
+    pub start_min_ns: u32,
+    /// Most time from the trigger of the scan to the start of the tick, ns: the difference is jitter.
+    pub start_max_ns: u32,
+    /// Telemetry rows that found no room.
+    pub telemetry_lost: u32,
+    /// Events that found no room.
+    pub events_lost: u32,
+    /// Frames from the host that were thrown away.
+    pub frames_rejected: u32,
+    /// Errors of the serial line.
+    pub line_errors: u32,
+}
