@@ -101,38 +101,47 @@ fn element(model: Option<FrictionModel<f32>>, steps: u32, seed: u32) -> u64 {
 
 /// One hash per model of [`NAMES`]; 0 stands for a model that could not be built.
 pub fn run(steps: u32) -> [u64; MODELS] {
+    core::array::from_fn(|model| run_model(model, steps))
+}
+
+/// The hash of one model of [`NAMES`] by its index, so that the chip can work in pieces; 0 stands for a
+/// model that could not be built or is not there.
+pub fn run_model(model: usize, steps: u32) -> u64 {
     let brush = BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 };
     let series = SeriesParameters { k_u_n_per_m: 3e4, c_u_n_s_per_m: 160.0, bristles: BRISTLES };
-    let patch = PatchParameters {
-        sigma0_per_m: 2e3,
-        a2_s_per_m: 0.01,
-        stribeck: BRISTLES.stribeck,
-        length_m: 0.01,
-        largest_transport_speed_m_s: 3.0,
-    };
-    let backward = Lugre::new(&BRISTLES, STEP_S).map(|m| m.with_scheme(Scheme::BackwardEuler));
-    [
-        element(FrictionModel::brush(&brush, STEP_S).ok(), steps, 1),
-        element(FrictionModel::lugre(&BRISTLES, STEP_S).ok(), steps, 2),
-        backward.map_or(0, |model| {
+    match model {
+        0 => element(FrictionModel::brush(&brush, STEP_S).ok(), steps, 1),
+        1 => element(FrictionModel::lugre(&BRISTLES, STEP_S).ok(), steps, 2),
+        2 => Lugre::new(&BRISTLES, STEP_S).map_or(0, |model| {
+            let model = model.with_scheme(Scheme::BackwardEuler);
             let mut state = LugreState::default();
             hash(steps, 3, |contact| model.step(&mut state, contact).force_n)
         }),
-        element(FrictionModel::modified_lugre(&BRISTLES, STEP_S).ok(), steps, 4),
-        element(FrictionModel::series(&series, STEP_S).ok(), steps, 5),
-        LugrePatch::<f32, 20>::new(&patch, STEP_S).map_or(0, |model| {
-            let mut state = PatchState::default();
-            hash(steps, 6, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
-        }),
-        ModifiedLugrePatch::<f32, 20>::new(&BRISTLES, 0.01, 3.0, STEP_S).map_or(0, |model| {
+        3 => element(FrictionModel::modified_lugre(&BRISTLES, STEP_S).ok(), steps, 4),
+        4 => element(FrictionModel::series(&series, STEP_S).ok(), steps, 5),
+        5 => {
+            let patch = PatchParameters {
+                sigma0_per_m: 2e3,
+                a2_s_per_m: 0.01,
+                stribeck: BRISTLES.stribeck,
+                length_m: 0.01,
+                largest_transport_speed_m_s: 3.0,
+            };
+            LugrePatch::<f32, 20>::new(&patch, STEP_S).map_or(0, |model| {
+                let mut state = PatchState::default();
+                hash(steps, 6, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
+            })
+        }
+        6 => ModifiedLugrePatch::<f32, 20>::new(&BRISTLES, 0.01, 3.0, STEP_S).map_or(0, |model| {
             let mut state = ModifiedPatchState::default();
             hash(steps, 7, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
         }),
-        BrushPatch::<f32, 20>::new(&brush, 0.01, 3.0, STEP_S).map_or(0, |model| {
+        7 => BrushPatch::<f32, 20>::new(&brush, 0.01, 3.0, STEP_S).map_or(0, |model| {
             let mut state = BrushPatchState::default();
             hash(steps, 8, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
         }),
-    ]
+        _ => 0,
+    }
 }
 
 #[cfg(test)]

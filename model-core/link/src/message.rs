@@ -38,8 +38,6 @@ pub enum Command {
     Hello,
     /// Nothing, but the host is still there. Any valid frame counts as much.
     KeepAlive,
-    /// Mode, faults and counters now.
-    Health,
     /// Enable the drives at zero torque.
     Arm,
     /// Drives off at once.
@@ -126,7 +124,7 @@ pub enum Message {
     },
     /// A row of telemetry.
     Telemetry(TelemetryRow),
-    /// Counters, ten times a second while telemetry is on.
+    /// State and counters, ten times a second.
     Health(Health),
     /// Something happened.
     Event(EventMessage),
@@ -140,8 +138,6 @@ pub enum Answer {
     Done,
     /// Who is here.
     Hello(Hello),
-    /// Counters and state.
-    Health(Health),
     /// The supervisor refused.
     Refused {
         /// Number of the refusal, `model_core::control::command::Refusal`.

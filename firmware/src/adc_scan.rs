@@ -1,0 +1,175 @@
+//! The scan of the analogue inputs: TIM6 starts it, DMA1 stream 7 stores it, its end starts the tick.
+//!
+//! Five channels, 16 bit, 16.5 + 8.5 cycles of 32 MHz each: 3.9 µs from the trigger to the last code. The
+//! DMA's end of transfer, not the converter's end of sequence, is the tick's interrupt: only then is the
+//! last code in memory. A scan that was cut short leaves the DMA between two ranks; this is checked every
+//! tick, and the scan started anew.
+
+use crate::board::{SCAN_CHANNELS, TICK_HZ, TICK_TIMER_HZ};
+use crate::memory::{SCAN, SCAN_CODES};
+use core::sync::atomic::Ordering::Relaxed;
+use embassy_stm32::adc::Adc;
+use embassy_stm32::pac::adc::vals::{Adstp, Dmngt, Exten, Ovrmod, Pcsel, Res, SampleTime};
+use embassy_stm32::pac::dma::vals::{Dir, Pl, Size};
+use embassy_stm32::pac::timer::vals::Mms;
+use embassy_stm32::pac::{ADC1, DMA1, DMAMUX1, RCC, TIM6};
+use embassy_stm32::{Peri, peripherals, rcc};
+use model_core::control::AdcScan;
+
+/// DMA1 stream, and channel of DMAMUX1.
+const STREAM: usize = 7;
+/// DMAMUX1 request of ADC1 (RM0433, DMAMUX1 mapping).
+const ADC1_REQUEST: u8 = 9;
+/// Trigger input of ADC1 that TIM6's trigger output is wired to (RM0433, ADC external triggers).
+const TIM6_TRIGGER: u8 = 13;
+const ITEMS: u16 = SCAN as u16;
+
+/// Powers and calibrates the converter, and sets scan and DMA up. No scan runs before [`start_timer`].
+pub fn start(adc: Peri<'static, peripherals::ADC1>) {
+    // The driver does power-up, calibration and enabling; the scan itself is ours.
+    let _ = Adc::new(adc);
+    ADC1.sqr1().modify(|w| w.set_l(SCAN as u8 - 1));
+    for (rank, channel) in SCAN_CHANNELS.into_iter().enumerate() {
+        match rank {
+            0..4 => ADC1.sqr1().modify(|w| w.set_sq(rank, channel)),
+            _ => ADC1.sqr2().modify(|w| w.set_sq(rank - 4, channel)),
+        }
+        let channel = usize::from(channel);
+        ADC1.pcsel().modify(|w| w.set_pcsel(channel, Pcsel::PRESELECTED));
+        let (register, place) = if channel < 10 { (0, channel) } else { (1, channel - 10) };
+        ADC1.smpr(register).modify(|w| w.set_smp(place, SampleTime::CYCLES16_5));
+    }
+    ADC1.cfgr().modify(|w| {
+        w.set_res(Res::BITS16);
+        w.set_cont(false);
+        w.set_ovrmod(Ovrmod::PRESERVE);
+        w.set_dmngt(Dmngt::DMA_CIRCULAR);
+        w.set_extsel(TIM6_TRIGGER);
+        w.set_exten(Exten::RISING_EDGE);
+    });
+    RCC.ahb1enr().modify(|w| w.set_dma1en(true));
+    DMAMUX1.ccr(STREAM).write(|w| w.set_dmareq_id(ADC1_REQUEST));
+    DMA1.st(STREAM).par().write_value(ADC1.dr().as_ptr() as u32);
+    DMA1.st(STREAM).m0ar().write_value(SCAN_CODES.as_ptr() as u32);
+    arm();
+}
+
+/// Starts the control period.
+pub fn start_timer() {
+    rcc::enable_and_reset::<peripherals::TIM6>();
+    TIM6.psc().write_value(0);
+    TIM6.arr().write(|w| w.set_arr((TICK_TIMER_HZ / TICK_HZ - 1) as u16));
+    TIM6.cr2().modify(|w| w.set_mms(Mms::UPDATE));
+    TIM6.dier().modify(|w| w.set_uie(true));
+    TIM6.cr1().modify(|w| w.set_cen(true));
+}
+
+fn arm() {
+    let stream = DMA1.st(STREAM);
+    clear_transfer_flags();
+    stream.ndtr().write(|w| w.set_ndt(ITEMS));
+    stream.cr().write(|w| {
+        w.set_dir(Dir::PERIPHERAL_TO_MEMORY);
+        w.set_minc(true);
+        w.set_circ(true);
+        w.set_psize(Size::BITS16);
+        w.set_msize(Size::BITS16);
+        w.set_pl(Pl::VERY_HIGH);
+        w.set_tcie(true);
+        w.set_en(true);
+    });
+    ADC1.isr().write(|w| {
+        w.set_eos(true);
+        w.set_ovr(true);
+    });
+    ADC1.cr().modify(|w| w.set_adstart(true));
+}
+
+fn clear_transfer_flags() {
+    let place = STREAM % 4;
+    DMA1.ifcr(STREAM / 4).write(|w| {
+        w.set_tcif(place, true);
+        w.set_htif(place, true);
+        w.set_teif(place, true);
+        w.set_feif(place, true);
+        w.set_dmeif(place, true);
+    });
+}
+
+/// Stops converter and stream wherever they are and starts them at rank 1. Takes some microseconds.
+#[cold]
+fn restart() {
+    if ADC1.cr().read().adstart() {
+        ADC1.cr().modify(|w| w.set_adstp(Adstp::STOP));
+        for _ in 0..1000 {
+            if !ADC1.cr().read().adstart() {
+                break;
+            }
+        }
+    }
+    DMA1.st(STREAM).cr().modify(|w| w.set_en(false));
+    for _ in 0..1000 {
+        if !DMA1.st(STREAM).cr().read().en() {
+            break;
+        }
+    }
+    arm();
+}
+
+/// What came of the scan.
+#[derive(Clone, Copy)]
+pub struct Scan {
+    /// The codes.
+    pub codes: AdcScan,
+    /// Codes were lost, and the scan was started anew.
+    pub overrun: bool,
+}
+
+/// Takes the scan that just ended and acknowledges it.
+#[inline(always)]
+pub fn take() -> Scan {
+    let converter = ADC1.isr().read();
+    let in_step = DMA1.st(STREAM).ndtr().read().ndt() == ITEMS;
+    DMA1.ifcr(STREAM / 4).write(|w| w.set_tcif(STREAM % 4, true));
+    let overrun = converter.ovr() || !converter.eos() || !in_step;
+    if overrun {
+        restart();
+    } else {
+        ADC1.isr().write(|w| w.set_eos(true));
+    }
+    Scan { codes: codes(), overrun }
+}
+
+/// The codes in memory, fresh or not.
+#[must_use]
+#[inline(always)]
+pub fn codes() -> AdcScan {
+    let [friction, normal, m1, m2, supply] = &SCAN_CODES;
+    AdcScan {
+        friction_bridge: friction.load(Relaxed),
+        normal_bridge: normal.load(Relaxed),
+        m1_torque: m1.load(Relaxed),
+        m2_torque: m2.load(Relaxed),
+        supply: supply.load(Relaxed),
+    }
+}
+
+/// Time since the last trigger of the scan, in periods of the tick timer.
+#[must_use]
+#[inline(always)]
+pub fn since_trigger() -> u16 {
+    TIM6.cnt().read().cnt()
+}
+
+/// Whether a further period has begun and nobody has noticed.
+#[must_use]
+#[inline(always)]
+pub fn period_over() -> bool {
+    TIM6.sr().read().uif()
+}
+
+/// Acknowledges the period.
+#[inline(always)]
+pub fn acknowledge_period() {
+    TIM6.sr().write(|w| w.set_uif(false));
+}

@@ -1,0 +1,74 @@
+//! Clock tree, and where the clock comes from.
+//!
+//! | clock | rate | why |
+//! |---|---|---|
+//! | HSE | 8 MHz | the ST-LINK's crystal: speeds and times are derived from it |
+//! | PLL1 P | 8 / 2 · 240 / 2 = 480 MHz | the core's highest rate, in voltage scale 0 |
+//! | AHB | 240 MHz | its highest rate |
+//! | APB1 to APB4 | 120 MHz | their highest rate; timers run at twice that |
+//! | TIM6 | 240 MHz / 24 000 | exactly 10 kHz |
+//! | PLL2 P | 8 / 2 · 64 / 4 = 64 MHz | ADC kernel, halved in the converter: 32 MHz, limit at 16 bit is 36 |
+//! | USART3 | 120 MHz / 60 | exactly 2 Mbaud |
+//!
+//! Without the 8 MHz the internal oscillator takes its place (64 / 16 · 240 / 2), within 1 %: the rig then
+//! still answers, says so, and its times and speeds are off by as much. When the crystal fails later, the
+//! clock security system traps, and the trap makes safe.
+
+use embassy_stm32::rcc::{
+    self, AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource,
+    Sysclk, VoltageScale, mux,
+};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, interrupt::Priority, pac};
+
+/// Reads of the ready flag before the crystal counts as missing: some 20 ms at the 64 MHz of the start.
+const PATIENCE: u32 = 200_000;
+
+/// Whether the 8 MHz from the ST-LINK are there. To be asked before the clock tree is set up.
+#[must_use]
+pub fn crystal_present() -> bool {
+    let control = pac::RCC.cr();
+    control.modify(|w| w.set_hsebyp(true));
+    control.modify(|w| w.set_hseon(true));
+    let ready = (0..PATIENCE).any(|_| control.read().hserdy());
+    control.modify(|w| w.set_hseon(false));
+    while ready && control.read().hserdy() {}
+    ready
+}
+
+/// The clock tree of the table above.
+#[must_use]
+pub fn config(crystal: bool) -> Config {
+    let mut config = Config::default();
+    let (source, prediv) = if crystal {
+        config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
+        (PllSource::HSE, PllPreDiv::DIV2)
+    } else {
+        (PllSource::HSI, PllPreDiv::DIV16)
+    };
+    let pll =
+        |mul, divp| Some(Pll { source, prediv, mul, fracn: None, divp: Some(divp), divq: None, divr: None });
+    config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
+    config.rcc.hsi48 = None;
+    config.rcc.pll1 = pll(PllMul::MUL240, PllDiv::DIV2);
+    config.rcc.pll2 = pll(PllMul::MUL64, PllDiv::DIV4);
+    config.rcc.sys = Sysclk::PLL1_P;
+    config.rcc.ahb_pre = AHBPrescaler::DIV2;
+    config.rcc.apb1_pre = APBPrescaler::DIV2;
+    config.rcc.apb2_pre = APBPrescaler::DIV2;
+    config.rcc.apb3_pre = APBPrescaler::DIV2;
+    config.rcc.apb4_pre = APBPrescaler::DIV2;
+    config.rcc.voltage_scale = VoltageScale::Scale0;
+    config.rcc.mux.adcsel = mux::Adcsel::PLL2_P;
+    config.rcc.ls = LsConfig::default_lsi();
+    // The control tick is at P1; every driver's DMA comes after it.
+    config.dma_interrupt_priority = Priority::P6;
+    config.bdma_interrupt_priority = Priority::P6;
+    config.mdma_interrupt_priority = Priority::P6;
+    config
+}
+
+/// Turns the clock security system on: a crystal that fails traps (NMI) instead of slowing the loop.
+pub fn watch_crystal() {
+    pac::RCC.cr().modify(|w| w.set_hsecsson(true));
+}

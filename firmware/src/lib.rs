@@ -1,0 +1,23 @@
+//! Firmware of the rubber-asphalt rig for the NUCLEO-H743ZI2.
+//!
+//! The control law is `model-core`; here are the pins, the clock, the tick that calls it, what makes the
+//! outputs safe, the link to the host, and the settings in flash.
+#![no_std]
+
+pub mod adc_scan;
+pub mod board;
+pub mod capture;
+pub mod clocks;
+pub mod encoders;
+pub mod flash;
+pub mod handover;
+pub mod inputs;
+pub mod kept;
+pub mod link;
+pub mod log;
+pub mod memory;
+pub mod outputs;
+pub mod restart;
+pub mod settings;
+pub mod tick;
+pub mod watchdog;

@@ -1,0 +1,41 @@
+//! Bytes to requests, requests to the operator, answers to the outgoing queue.
+
+use super::{FRAMES_REJECTED, LINE_ERRORS, OUTGOING, Operator};
+use crate::tick;
+use core::sync::atomic::Ordering::Relaxed;
+use embassy_stm32::usart::RingBufferedUartRx;
+use rig_link::frame::Receiver;
+use rig_link::message::{Message, Request};
+
+/// Receives for ever.
+#[embassy_executor::task]
+pub async fn receive(mut port: RingBufferedUartRx<'static>, mut operator: Operator) {
+    let mut receiver = Receiver::new();
+    let mut bytes = [0; 256];
+    loop {
+        let count = match port.read(&mut bytes).await {
+            Ok(count) => count,
+            Err(error) => {
+                LINE_ERRORS.store(LINE_ERRORS.load(Relaxed).saturating_add(1), Relaxed);
+                defmt::warn!("link: {}", error);
+                receiver.discard();
+                FRAMES_REJECTED.store(receiver.rejected(), Relaxed);
+                continue;
+            }
+        };
+        for byte in bytes.iter().take(count) {
+            let Some(received) = receiver.push::<Request>(*byte) else { continue };
+            match received {
+                Ok(Request { id, command }) => {
+                    tick::link_heard();
+                    let answer = operator.carry_out(command).await;
+                    OUTGOING.send(Message::Answer { id, answer }).await;
+                }
+                Err(error) => {
+                    FRAMES_REJECTED.store(receiver.rejected(), Relaxed);
+                    defmt::warn!("link: frame thrown away: {}", error);
+                }
+            }
+        }
+    }
+}

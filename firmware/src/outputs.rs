@@ -1,0 +1,46 @@
+//! Torque references and drive enables, at register level, so that a panic or a trap can make them safe.
+//!
+//! The DAC's channels are enabled with mid-scale already in their registers: they never show the 0 V that
+//! would mean full negative torque.
+
+use crate::board::{M1_ENABLE, M2_ENABLE};
+use embassy_stm32::pac::{DAC1, RCC};
+use embassy_stm32::{peripherals, rcc};
+use model_core::control::DAC_ZERO;
+
+/// Starts the DAC at zero torque. The enables are low already (`board::configure`).
+pub fn start() {
+    rcc::enable_and_reset::<peripherals::DAC1>();
+    write_references([DAC_ZERO; 2]);
+    DAC1.cr().modify(|w| {
+        w.set_en(0, true);
+        w.set_en(1, true);
+    });
+    // Without a trigger the data register passes on one bus clock after the write.
+    write_references([DAC_ZERO; 2]);
+}
+
+/// Both torque references in one write.
+#[inline(always)]
+pub fn write_references(codes: [u16; 2]) {
+    DAC1.dhr12rd().write(|w| w.0 = u32::from(codes[0]) | u32::from(codes[1]) << 16);
+}
+
+/// Both drive enables in one write.
+#[inline(always)]
+pub fn write_enables(enable: [bool; 2]) {
+    let change = M1_ENABLE.change(enable[0]) | M2_ENABLE.change(enable[1]);
+    M1_ENABLE.port.bsrr().write(|w| w.0 = change);
+}
+
+/// Drives off, zero torque; from any context, any number of times. The caller has stopped the control
+/// tick (interrupts masked) if this is to last.
+pub fn make_safe() {
+    // Before their clocks are on these blocks do not answer, and the pins are still off from reset.
+    if RCC.ahb4enr().read().gpioden() {
+        write_enables([false; 2]);
+    }
+    if RCC.apb1lenr().read().dac12en() {
+        write_references([DAC_ZERO; 2]);
+    }
+}

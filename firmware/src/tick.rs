@@ -1,0 +1,319 @@
+//! The control tick: 10 000 times a second, in the interrupt at the end of the scan.
+//!
+//! TIM6 starts the scan; 4 µs later the scan's DMA interrupt runs the tick. TIM6's own interrupt, at the
+//! same priority, only looks whether the period before it had its tick: if the scan did not come, it runs
+//! the tick with the old codes, so that the supervisor notices and acts. Nothing in here waits, locks,
+//! logs, allocates or formats. What goes out goes into queues with one reader and one writer, and
+//! what finds no room is counted.
+//!
+//! PE13 is high from the tick's entry to its exit: the time on an oscilloscope, the instructions on an emulator.
+
+use crate::capture::Recorder;
+use crate::watchdog::Feeder;
+use crate::{adc_scan, board, encoders, inputs, outputs};
+use core::cell::UnsafeCell;
+use core::sync::atomic::Ordering::{Relaxed, Release};
+use core::sync::atomic::{AtomicBool, AtomicU32};
+use cortex_m::peripheral::DWT;
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use heapless::spsc::{Consumer, Producer, Queue};
+use model_core::control::{
+    Command, ControlConfig, ControlState, Event, Fault, Leds, Outputs, Refused, Samples, apply, step,
+};
+use rig_link::capture::CaptureTrigger;
+use rig_link::telemetry::{Health, TelemetryRow};
+use static_cell::StaticCell;
+
+/// What a thread asks of the tick. One order is taken a tick, and answered.
+pub enum Order {
+    /// A command to the control core.
+    Core(Command<'static>),
+    /// A row every so many ticks; 0 stops.
+    Telemetry(u16),
+    /// Begin a capture.
+    CaptureArm(CaptureTrigger),
+    /// Trigger the capture.
+    CaptureTrigger,
+}
+
+/// What came of an order.
+pub type Carried = Result<(), Refused>;
+
+const ROWS: usize = 64;
+const EVENTS: usize = 32;
+/// Ticks between two health records.
+const HEALTH_TICKS: u16 = 1000;
+
+/// The threads' ends of the queues.
+pub struct Ends {
+    /// Orders to the tick.
+    pub orders: Producer<'static, Order>,
+    /// Answers to them, in order.
+    pub answers: Consumer<'static, Carried>,
+    /// Telemetry.
+    pub rows: Consumer<'static, TelemetryRow>,
+    /// Health.
+    pub health: Consumer<'static, Health>,
+    /// Events of the control core.
+    pub events: Consumer<'static, Event>,
+}
+
+struct Tick {
+    config: ControlConfig,
+    state: ControlState,
+    orders: Consumer<'static, Order>,
+    answers: Producer<'static, Carried>,
+    rows: Producer<'static, TelemetryRow>,
+    health_out: Producer<'static, Health>,
+    events: Producer<'static, Event>,
+    recorder: Recorder,
+    feeder: Feeder,
+    /// The tick of this period has run.
+    ran: bool,
+    late: bool,
+    every_ticks: u16,
+    until_row: u16,
+    until_health: u16,
+    sequence: u32,
+    rows_lost: u32,
+    missed_scans: u32,
+    cycles: u32,
+    cycles_max: u32,
+    start_min: u16,
+    start_max: u16,
+}
+
+struct TickCell(UnsafeCell<Option<Tick>>);
+
+// SAFETY: `start` fills the cell before it enables the two interrupts. After that only they use it, and as
+// they have the same priority neither interrupts the other.
+unsafe impl Sync for TickCell {}
+
+static TICK: TickCell = TickCell(UnsafeCell::new(None));
+static NOW: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
+static LINK_HEARD: AtomicBool = AtomicBool::new(false);
+static MODE: AtomicU32 = AtomicU32::new(0);
+
+/// The control tick now.
+#[must_use]
+pub fn now() -> u64 {
+    u64::from(NOW[0].load(Relaxed)) | u64::from(NOW[1].load(Relaxed)) << 32
+}
+
+/// Number of the supervisor's mode.
+#[must_use]
+pub fn mode() -> u8 {
+    MODE.load(Relaxed) as u8
+}
+
+/// A valid frame came from the host.
+pub fn link_heard() {
+    LINK_HEARD.store(true, Release);
+}
+
+/// Hands the control core to the interrupt and starts the control period. To be called once.
+pub fn start(config: ControlConfig, state: ControlState) -> Ends {
+    static ORDERS: StaticCell<Queue<Order, 4>> = StaticCell::new();
+    static ANSWERS: StaticCell<Queue<Carried, 4>> = StaticCell::new();
+    static ROWS_QUEUE: StaticCell<Queue<TelemetryRow, ROWS>> = StaticCell::new();
+    static HEALTH: StaticCell<Queue<Health, 4>> = StaticCell::new();
+    static EVENTS_QUEUE: StaticCell<Queue<Event, EVENTS>> = StaticCell::new();
+    let (order_end, orders) = ORDERS.init(Queue::new()).split();
+    let (answers, answer_end) = ANSWERS.init(Queue::new()).split();
+    let (rows, row_end) = ROWS_QUEUE.init(Queue::new()).split();
+    let (health_out, health_end) = HEALTH.init(Queue::new()).split();
+    let (events, event_end) = EVENTS_QUEUE.init(Queue::new()).split();
+    let tick = Tick {
+        config,
+        state,
+        orders,
+        answers,
+        rows,
+        health_out,
+        events,
+        recorder: Recorder::default(),
+        feeder: Feeder::default(),
+        ran: true,
+        late: false,
+        every_ticks: 0,
+        until_row: 0,
+        until_health: HEALTH_TICKS,
+        sequence: 0,
+        rows_lost: 0,
+        missed_scans: 0,
+        cycles: 0,
+        cycles_max: 0,
+        start_min: u16::MAX,
+        start_max: 0,
+    };
+    // SAFETY: the interrupts that use the cell are not enabled yet, and the `StaticCell`s above let this
+    // function pass once only.
+    unsafe { *TICK.0.get() = Some(tick) };
+    for line in [interrupt::DMA1_STREAM7, interrupt::TIM6_DAC] {
+        line.unpend();
+        line.set_priority(Priority::P1);
+        // SAFETY: the handlers of both lines are below, and what they use is in place.
+        unsafe { line.enable() };
+    }
+    adc_scan::start_timer();
+    Ends { orders: order_end, answers: answer_end, rows: row_end, health: health_end, events: event_end }
+}
+
+#[interrupt]
+fn DMA1_STREAM7() {
+    board::TICK_PULSE.drive(true);
+    // SAFETY: see `TickCell`; this is one of its two interrupts.
+    if let Some(tick) = unsafe { &mut *TICK.0.get() } {
+        tick.ran = true;
+        tick.run(Some(adc_scan::take()));
+    }
+    board::TICK_PULSE.drive(false);
+}
+
+#[interrupt]
+fn TIM6_DAC() {
+    adc_scan::acknowledge_period();
+    // SAFETY: see `TickCell`; this is the other of its two interrupts.
+    if let Some(tick) = unsafe { &mut *TICK.0.get() }
+        && !core::mem::take(&mut tick.ran)
+    {
+        board::TICK_PULSE.drive(true);
+        tick.missed_scans = tick.missed_scans.saturating_add(1);
+        tick.run(None);
+        board::TICK_PULSE.drive(false);
+    }
+}
+
+impl Tick {
+    #[inline(always)]
+    fn run(&mut self, scan: Option<adc_scan::Scan>) {
+        let started = DWT::cycle_count();
+        let mut samples = Samples {
+            m1_count: encoders::m1_count(),
+            m2_count: encoders::m2_count(),
+            adc_fresh: scan.is_some_and(|scan| !scan.overrun),
+            adc_overrun: scan.is_some_and(|scan| scan.overrun),
+            adc: scan.map_or_else(adc_scan::codes, |scan| scan.codes),
+            deadline_missed: self.late,
+            link_heard: heard(),
+            ..Samples::default()
+        };
+        inputs::read_into(&mut samples);
+        if scan.is_some() {
+            let since = adc_scan::since_trigger();
+            self.start_min = self.start_min.min(since);
+            self.start_max = self.start_max.max(since);
+        }
+        if self.orders.ready() {
+            self.carry_out();
+        }
+        let outputs = step(&self.config, &mut self.state, &samples);
+        outputs::write_references(outputs.dac);
+        outputs::write_enables(outputs.drive_enable);
+        lamps(&outputs.leds);
+        self.recorder.record(&samples, &outputs);
+        self.report(&outputs);
+        self.feeder.feed();
+        self.late = adc_scan::period_over();
+        self.cycles = DWT::cycle_count().wrapping_sub(started);
+        self.cycles_max = self.cycles_max.max(self.cycles);
+    }
+
+    #[cold]
+    fn carry_out(&mut self) {
+        let Some(order) = self.orders.dequeue() else { return };
+        let carried = match order {
+            Order::Core(command) => apply(&mut self.config, &mut self.state, command),
+            Order::Telemetry(every_ticks) => {
+                self.every_ticks = every_ticks;
+                self.until_row = every_ticks;
+                self.sequence = 0;
+                Ok(())
+            }
+            Order::CaptureArm(trigger) => {
+                self.recorder.arm(trigger);
+                Ok(())
+            }
+            Order::CaptureTrigger => {
+                self.recorder.trigger(now());
+                Ok(())
+            }
+        };
+        // The threads send one order at a time, so there is room.
+        let _ = self.answers.enqueue(carried);
+    }
+
+    #[inline(always)]
+    fn report(&mut self, outputs: &Outputs) {
+        let record = &outputs.record;
+        NOW[0].store(record.tick as u32, Relaxed);
+        NOW[1].store((record.tick >> 32) as u32, Relaxed);
+        MODE.store(u32::from(record.mode.number()), Relaxed);
+        if self.every_ticks != 0 {
+            self.until_row -= 1;
+            if self.until_row == 0 {
+                self.until_row = self.every_ticks;
+                let row = TelemetryRow::new(record, self.sequence, self.cycles);
+                self.sequence = self.sequence.wrapping_add(1);
+                if self.rows.enqueue(row).is_err() {
+                    self.rows_lost = self.rows_lost.saturating_add(1);
+                }
+            }
+        }
+        self.until_health -= 1;
+        if self.until_health == 0 {
+            self.until_health = HEALTH_TICKS;
+            self.report_health(outputs);
+        }
+        while self.events.ready()
+            && let Some(event) = self.state.pop_event()
+        {
+            // There is room: `ready` said so, and this is the only writer.
+            let _ = self.events.enqueue(event);
+        }
+    }
+
+    #[cold]
+    fn report_health(&mut self, outputs: &Outputs) {
+        let record = &outputs.record;
+        let health = Health {
+            tick: record.tick,
+            mode: record.mode.number(),
+            fault: record.fault.map_or(0, Fault::number),
+            faults: record.faults.0,
+            causes: record.causes.0,
+            deadline_misses: record.deadline_misses,
+            missed_scans: self.missed_scans,
+            cycles_last: self.cycles,
+            cycles_max: self.cycles_max,
+            start_min_ns: to_ns(self.start_min),
+            start_max_ns: to_ns(self.start_max),
+            telemetry_lost: self.rows_lost,
+            events_lost: self.state.events_lost(),
+            // The link's own counters are added where the record is sent.
+            frames_rejected: 0,
+            line_errors: 0,
+        };
+        // Without a reader the next record says the same and more.
+        let _ = self.health_out.enqueue(health);
+    }
+}
+
+/// Periods of the tick timer (240 MHz) in ns.
+const fn to_ns(periods: u16) -> u32 {
+    periods as u32 * 25 / 6
+}
+
+#[inline(always)]
+fn heard() -> bool {
+    // Load before store: a store that is not needed would cost a frame that comes in between.
+    LINK_HEARD.load(Relaxed) && LINK_HEARD.swap(false, Relaxed)
+}
+
+#[inline(always)]
+fn lamps(leds: &Leds) {
+    let change = board::LAMP_GREEN.change(leds.ready) | board::LAMP_RED.change(leds.fault);
+    board::LAMP_GREEN.port.bsrr().write(|w| w.0 = change);
+    board::LAMP_YELLOW.drive(leds.live);
+}
