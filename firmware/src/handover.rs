@@ -16,7 +16,7 @@ pub struct Handover<T> {
 // SAFETY: `lend` gives out shared references only after it alone claimed the cell, and writes only then.
 unsafe impl<T: Send + Sync> Sync for Handover<T> {}
 
-impl<T: Clone + 'static> Handover<T> {
+impl<T: 'static> Handover<T> {
     /// A free cell.
     #[must_use]
     #[allow(clippy::new_without_default)] // for statics
@@ -25,13 +25,13 @@ impl<T: Clone + 'static> Handover<T> {
     }
 
     /// Stores a value and lends it, unless the cell is lent already.
-    pub fn lend(&'static self, value: &T) -> Option<&'static T> {
+    pub fn lend(&'static self, value: T) -> Option<&'static T> {
         if self.lent.swap(true, Ordering::Acquire) {
             return None;
         }
         // SAFETY: the swap above claimed the cell: no reference to the old value is alive (`reclaim`), and
         // nobody else writes. The value is initialised before the reference is made.
-        unsafe { Some((*self.value.get()).write(value.clone())) }
+        unsafe { Some((*self.value.get()).write(value)) }
     }
 
     /// Takes the cell back.

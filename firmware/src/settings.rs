@@ -65,7 +65,7 @@ impl Stored {
             }
         }
         if let Some(model) = &self.model {
-            model.prepare(settings.tick_s)?;
+            settings.observer.model = model.into();
         }
         Ok(settings)
     }
@@ -182,10 +182,11 @@ impl Settings {
         Ok((stored, config))
     }
 
-    /// The stored model.
+    /// The stored model, and the one in force.
     #[must_use]
-    pub fn model(&self) -> Option<ModelRecord> {
-        self.stored.model
+    pub fn model(&self) -> (Option<ModelRecord>, ModelRecord) {
+        let stored = self.stored.model;
+        (stored, stored.unwrap_or_else(|| (&defaults().observer.model).into()))
     }
 
     /// Writes one value; `stored` is what [`Self::with_value`] gave for it.

@@ -9,7 +9,7 @@ use crate::{capture, restart, tick};
 use embassy_time::{Duration, Instant, Timer};
 use heapless::spsc::{Consumer, Producer};
 use heapless::{String, Vec};
-use model_core::control::{Command as Core, ControlConfig, Mode, PreparedExperiment, Refusal};
+use model_core::control::{Command as Core, ControlConfig, Mode, ObserverModel, PreparedExperiment, Refusal};
 use model_core::error::ParameterError;
 use model_core::selfcheck;
 use rig_link::message::{
@@ -20,6 +20,7 @@ use rig_link::program::{ProgramHeader, Upload};
 use rig_link::settings::{SCHEMA_VERSION, by_key};
 
 static PROGRAM: Handover<PreparedExperiment> = Handover::new();
+static MODEL: Handover<ObserverModel> = Handover::new();
 static CONFIG: Handover<ControlConfig> = Handover::new();
 
 /// Longest wait for the tick's answer to an order: it answers within a period.
@@ -170,11 +171,11 @@ impl Operator {
         let Ok(experiment) = self.upload.complete() else {
             return Answer::Rejected(Rejection::IncompleteProgram);
         };
-        let prepared: PreparedExperiment = match prepare(experiment) {
-            Ok(prepared) => prepared,
+        let lent = match experiment.prepare(&self.config) {
+            Ok(prepared) => PROGRAM.lend(prepared),
             Err(error) => return Answer::Rejected(Rejection::ImpossibleProgram { why: words(&error) }),
         };
-        let Some(lent) = PROGRAM.lend(&prepared) else { return Answer::Rejected(Rejection::NoTick) };
+        let Some(lent) = lent else { return Answer::Rejected(Rejection::NoTick) };
         let carried = self.ask(Order::Core(Core::LoadExperiment(lent))).await;
         give_back(&PROGRAM, &carried);
         carried.map_or_else(Answer::from, |()| Answer::Done)
@@ -182,7 +183,7 @@ impl Operator {
 
     /// Puts a configuration in force; possible only while the rig is disabled.
     async fn change(&mut self, config: &ControlConfig) -> Result<(), Answer> {
-        let lent = CONFIG.lend(config).ok_or(Answer::Rejected(Rejection::NoTick))?;
+        let lent = CONFIG.lend(*config).ok_or(Answer::Rejected(Rejection::NoTick))?;
         let carried = self.ask(Order::Core(Core::SetConfig(lent))).await;
         give_back(&CONFIG, &carried);
         carried?;
@@ -210,13 +211,23 @@ impl Operator {
             Ok(new) => new,
             Err(error) => return out_of_range(&error),
         };
-        if let Err(answer) = self.change(&config).await {
-            return answer;
+        if tick::mode() == Mode::Running.number() {
+            return Answer::Rejected(Rejection::NotDisabled);
         }
-        match self.settings.keep_model(model, stored).await {
-            Ok(()) => self.model(),
-            Err(refused) => self.restore(refused).await,
+        if let Err(refused) = self.settings.keep_model(model, stored).await {
+            return not_kept(&refused);
         }
+        // The model alone: a swap of the whole configuration would forget the tare.
+        let observed = config.settings().observer.model;
+        let lent = match ObserverModel::new(&observed, config.settings().tick_s) {
+            Ok(prepared) => MODEL.lend(prepared),
+            Err(error) => return out_of_range(&error),
+        };
+        let Some(lent) = lent else { return Answer::Rejected(Rejection::NoTick) };
+        let carried = self.ask(Order::Core(Core::SetModel(lent))).await;
+        give_back(&MODEL, &carried);
+        self.config = config;
+        carried.map_or_else(Answer::from, |()| self.model())
     }
 
     /// What could not be stored is not used either.
@@ -226,15 +237,12 @@ impl Operator {
         {
             return answer;
         }
-        match refused {
-            NotKept::OutOfRange(error) => out_of_range(&error),
-            NotKept::Storage => Answer::Rejected(Rejection::Storage),
-        }
+        not_kept(&refused)
     }
 
     fn model(&self) -> Answer {
-        let stored = self.settings.model();
-        Answer::Model { stored, active: stored.unwrap_or(ModelRecord::ASSUMED) }
+        let (stored, active) = self.settings.model();
+        Answer::Model { stored, active }
     }
 
     async fn erase(&mut self) -> Answer {
@@ -245,12 +253,14 @@ impl Operator {
         if self.settings.erase().await.is_err() {
             return Answer::Rejected(Rejection::Storage);
         }
-        // In force after the next start, which also re-reads what is stored now.
-        Answer::Done
+        match self.settings.config() {
+            Ok(config) => self.change(&config).await.map_or_else(|answer| answer, |()| Answer::Done),
+            Err(error) => out_of_range(&error),
+        }
     }
 }
 
-fn give_back<T: Clone + 'static>(cell: &'static Handover<T>, carried: &Result<(), Undone>) {
+fn give_back<T: 'static>(cell: &'static Handover<T>, carried: &Result<(), Undone>) {
     if !matches!(carried, Err(Undone::NoTick)) {
         // SAFETY: the tick answered, so `apply` has returned and holds the reference no longer. Without an
         // answer the cell stays lent for good.
@@ -269,6 +279,13 @@ fn read_capture(offset: u32) -> Answer {
             Answer::CaptureBytes { offset, bytes }
         }
         None => Answer::Rejected(Rejection::NoCapture),
+    }
+}
+
+fn not_kept(refused: &NotKept) -> Answer {
+    match refused {
+        NotKept::OutOfRange(error) => out_of_range(error),
+        NotKept::Storage => Answer::Rejected(Rejection::Storage),
     }
 }
 
@@ -292,10 +309,6 @@ fn self_check(case: u8, steps: u32) -> Answer {
         return Answer::Rejected(Rejection::UnknownCase);
     }
     Answer::SelfCheck { digest: selfcheck::run_model(case, steps) }
-}
-
-fn prepare(_: &model_core::control::Experiment) -> Result<PreparedExperiment, &'static str> {
-    Err("the control core does not run experiments yet")
 }
 
 /// Text of something, cut where it gets too long.

@@ -1,7 +1,6 @@
 //! The observer's friction model on the wire and in flash: the model file's numbers, nothing else.
 
-use model_core::error::ParameterError;
-use model_core::friction::FrictionModel;
+use model_core::control::{ControlSettings, ModelParameters};
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
 use model_core::friction::series::SeriesParameters;
@@ -56,56 +55,72 @@ pub struct BristleRecord {
     pub theta: f32,
 }
 
-impl BristleRecord {
-    fn parameters(&self) -> LugreParameters<f32> {
-        LugreParameters {
-            sigma0_n_per_m: self.sigma0_n_per_m,
-            sigma1_n_s_per_m: self.sigma1_n_s_per_m,
-            a2_s_per_m: self.a2_s_per_m,
+impl From<&LugreParameters<f32>> for BristleRecord {
+    fn from(p: &LugreParameters<f32>) -> Self {
+        Self {
+            sigma0_n_per_m: p.sigma0_n_per_m,
+            sigma1_n_s_per_m: p.sigma1_n_s_per_m,
+            a0: p.stribeck.a0,
+            a1: p.stribeck.a1,
+            a2_s_per_m: p.a2_s_per_m,
+            v0_m_s: p.stribeck.v0_m_s,
+            delta: p.stribeck.delta,
+            theta: p.stribeck.theta,
+        }
+    }
+}
+
+impl From<&BristleRecord> for LugreParameters<f32> {
+    fn from(record: &BristleRecord) -> Self {
+        Self {
+            sigma0_n_per_m: record.sigma0_n_per_m,
+            sigma1_n_s_per_m: record.sigma1_n_s_per_m,
+            a2_s_per_m: record.a2_s_per_m,
             stribeck: StribeckParameters {
-                a0: self.a0,
-                a1: self.a1,
-                v0_m_s: self.v0_m_s,
-                delta: self.delta,
-                theta: self.theta,
+                a0: record.a0,
+                a1: record.a1,
+                v0_m_s: record.v0_m_s,
+                delta: record.delta,
+                theta: record.theta,
             },
         }
     }
 }
 
-impl ModelRecord {
-    /// The model in the observer of a rig nobody has identified yet: the series element with assumed
-    /// values (all three elements together, 5 µm bristles at 88 N).
-    pub const ASSUMED: Self = Self::Series {
-        k_u_n_per_m: 3e4,
-        c_u_n_s_per_m: 160.0,
-        bristles: BristleRecord {
-            sigma0_n_per_m: 1.76e7,
-            sigma1_n_s_per_m: 0.0,
-            a0: 0.5,
-            a1: 0.7,
-            a2_s_per_m: 0.0,
-            v0_m_s: 0.5,
-            delta: 0.5,
-            theta: 1.0,
-        },
-    };
+impl From<&ModelParameters> for ModelRecord {
+    fn from(model: &ModelParameters) -> Self {
+        match model {
+            ModelParameters::Brush(p) => Self::Brush { c_n_per_m: p.c_n_per_m, mu_s: p.mu_s, mu_c: p.mu_c },
+            ModelParameters::Lugre(p) => Self::Lugre(p.into()),
+            ModelParameters::ModifiedLugre(p) => Self::ModifiedLugre(p.into()),
+            ModelParameters::Series(p) => Self::Series {
+                k_u_n_per_m: p.k_u_n_per_m,
+                c_u_n_s_per_m: p.c_u_n_s_per_m,
+                bristles: (&p.bristles).into(),
+            },
+        }
+    }
+}
 
-    /// The model, checked and prepared for a step size.
-    ///
-    /// # Errors
-    /// The parameter that is out of range.
-    pub fn prepare(&self, step_s: f32) -> Result<FrictionModel<f32>, ParameterError> {
-        match *self {
-            Self::Brush { c_n_per_m, mu_s, mu_c } => {
-                FrictionModel::brush(&BrushParameters { c_n_per_m, mu_s, mu_c }, step_s)
+impl From<&ModelRecord> for ModelParameters {
+    fn from(record: &ModelRecord) -> Self {
+        match *record {
+            ModelRecord::Brush { c_n_per_m, mu_s, mu_c } => {
+                Self::Brush(BrushParameters { c_n_per_m, mu_s, mu_c })
             }
-            Self::Lugre(bristles) => FrictionModel::lugre(&bristles.parameters(), step_s),
-            Self::ModifiedLugre(bristles) => FrictionModel::modified_lugre(&bristles.parameters(), step_s),
-            Self::Series { k_u_n_per_m, c_u_n_s_per_m, bristles } => {
-                let bristles = bristles.parameters();
-                FrictionModel::series(&SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles }, step_s)
+            ModelRecord::Lugre(bristles) => Self::Lugre((&bristles).into()),
+            ModelRecord::ModifiedLugre(bristles) => Self::ModifiedLugre((&bristles).into()),
+            ModelRecord::Series { k_u_n_per_m, c_u_n_s_per_m, bristles } => {
+                let bristles = (&bristles).into();
+                Self::Series(SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles })
             }
         }
+    }
+}
+
+impl Default for ModelRecord {
+    /// The model in the observer of a rig nobody has identified yet.
+    fn default() -> Self {
+        (&ControlSettings::default().observer.model).into()
     }
 }

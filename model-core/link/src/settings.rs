@@ -209,13 +209,15 @@ settings! {
     284: limits.over_force_n, "N";
     285: limits.persistence_ticks, "ticks";
 
-    300: encoder_watch.max_speed_rad_s, "rad/s";
-    301: encoder_watch.max_acceleration_rad_s2, "rad/s2";
-    302: encoder_watch.m2_breakaway_nm, "N m";
-    303: encoder_watch.m1_breakaway_nm, "N m";
-    304: encoder_watch.m2_free_speed_rad_s, "rad/s";
-    305: encoder_watch.m1_free_angle_rad, "rad";
-    306: encoder_watch.window_s, "s";
+    300: encoder_watch.m1_max_speed_rad_s, "rad/s";
+    301: encoder_watch.m1_max_acceleration_rad_s2, "rad/s2";
+    302: encoder_watch.m2_max_speed_rad_s, "rad/s";
+    303: encoder_watch.m2_max_acceleration_rad_s2, "rad/s2";
+    304: encoder_watch.m2_breakaway_nm, "N m";
+    305: encoder_watch.m1_breakaway_nm, "N m";
+    306: encoder_watch.m2_free_speed_rad_s, "rad/s";
+    307: encoder_watch.m1_free_angle_rad, "rad";
+    308: encoder_watch.window_s, "s";
 
     320: timing.boot_s, "s";
     321: timing.adc_stall_ticks, "ticks";

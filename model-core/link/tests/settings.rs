@@ -1,6 +1,8 @@
 //! The list of settings is sound, and an uploaded experiment is the one that was sent.
 #![allow(clippy::unwrap_used)]
-use model_core::control::{ControlSettings, Experiment, M1Mode, M2Mode, Segment, Shape};
+use model_core::control::{
+    ControlSettings, Experiment, M1Mode, M2Mode, ModelParameters, ObserverModel, Segment, Shape,
+};
 use rig_link::capture::CaptureRow;
 use rig_link::model::ModelRecord;
 use rig_link::program::{Incomplete, Upload, header, segments};
@@ -115,11 +117,19 @@ fn a_capture_row_reads_back_from_its_bytes() {
 }
 
 #[test]
-fn the_assumed_model_is_within_its_own_limits() {
-    assert!(ModelRecord::ASSUMED.prepare(1e-4).is_ok());
-    let ModelRecord::Series { k_u_n_per_m, bristles, .. } = ModelRecord::ASSUMED else {
-        panic!("a series element")
-    };
-    let broken = ModelRecord::Series { k_u_n_per_m, c_u_n_s_per_m: -1.0, bristles };
-    assert_eq!(broken.prepare(1e-4).map_err(|error| error.name), Err("c_u_n_s_per_m"));
+fn a_model_goes_to_the_observer_and_back_unchanged() {
+    let ModelRecord::Series { bristles, .. } = ModelRecord::default() else { panic!("a series element") };
+    for record in [
+        ModelRecord::default(),
+        ModelRecord::Brush { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 },
+        ModelRecord::Lugre(bristles),
+        ModelRecord::ModifiedLugre(bristles),
+    ] {
+        let parameters = ModelParameters::from(&record);
+        assert_eq!(ModelRecord::from(&parameters), record);
+        assert!(ObserverModel::new(&parameters, 1e-4).is_ok());
+    }
+    let broken = ModelRecord::Brush { c_n_per_m: 3e4, mu_s: 0.5, mu_c: 0.8 };
+    let refused = ObserverModel::new(&(&broken).into(), 1e-4);
+    assert_eq!(refused.map_err(|error| error.name), Err("mu_s"));
 }
