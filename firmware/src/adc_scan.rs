@@ -1,6 +1,6 @@
 //! The scan of the analogue inputs: TIM6 starts it, DMA1 stream 7 stores it, its end starts the tick.
 //!
-//! Five channels, 16 bit, 16.5 + 8.5 cycles of 32 MHz each: 3.9 µs from the trigger to the last code. The
+//! Five channels, 16 bit, 16.5 + 8.5 cycles of 25 MHz each: 5.0 µs from the trigger to the last code. The
 //! DMA's end of transfer, not the converter's end of sequence, is the tick's interrupt: only then is the
 //! last code in memory. A scan that was cut short leaves the DMA between two ranks; this is checked every
 //! tick, and the scan started anew.

@@ -7,7 +7,7 @@
 //! | AHB | 240 MHz | its highest rate |
 //! | APB1 to APB4 | 120 MHz | their highest rate; timers run at twice that |
 //! | TIM6 | 240 MHz / 24 000 | exactly 10 kHz |
-//! | PLL2 P | 8 / 2 · 64 / 4 = 64 MHz | ADC kernel, halved in the converter: 32 MHz, limit at 16 bit is 36 |
+//! | PLL2 P | 8 / 2 · 100 / 8 = 50 MHz | ADC kernel, halved in the converter: 25 MHz, limit at 16 bit is 36 |
 //! | USART3 | 120 MHz / 60 | exactly 2 Mbaud |
 //!
 //! Without the 8 MHz the internal oscillator takes its place (64 / 16 · 240 / 2), within 1 %: the rig then
@@ -51,7 +51,9 @@ pub fn config(crystal: bool) -> Config {
     config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
     config.rcc.hsi48 = None;
     config.rcc.pll1 = pll(PllMul::MUL240, PllDiv::DIV2);
-    config.rcc.pll2 = pll(PllMul::MUL64, PllDiv::DIV4);
+    config.rcc.pll2 = pll(PllMul::MUL100, PllDiv::DIV8);
+    // PLL3 runs for nothing: the driver leaves a PLL off by rewriting the dividers of those that run.
+    config.rcc.pll3 = pll(PllMul::MUL100, PllDiv::DIV8);
     config.rcc.sys = Sysclk::PLL1_P;
     config.rcc.ahb_pre = AHBPrescaler::DIV2;
     config.rcc.apb1_pre = APBPrescaler::DIV2;
@@ -60,7 +62,7 @@ pub fn config(crystal: bool) -> Config {
     config.rcc.apb4_pre = APBPrescaler::DIV2;
     config.rcc.voltage_scale = VoltageScale::Scale0;
     config.rcc.mux.adcsel = mux::Adcsel::PLL2_P;
-    config.rcc.ls = LsConfig::default_lsi();
+    config.rcc.ls = LsConfig::off();
     // The control tick is at P1; every driver's DMA comes after it.
     config.dma_interrupt_priority = Priority::P6;
     config.bdma_interrupt_priority = Priority::P6;

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | flash bank 1 | program | the settings are in bank 2, so erasing them does not stall fetches |
 //! | flash bank 2, sectors 0 and 1 | settings | two sectors: one is erased while the other is valid |
-//! | DTCM, first 24 KB | stack | at its lower end memory ends: an overflow traps instead of overwriting |
+//! | DTCM, first 56 KB | stack | at its lower end memory ends: an overflow traps instead of overwriting |
 //! | DTCM, the rest | `.data`, `.bss`: state of the loop | no wait states, no cache: the tick's time is steady |
 //! | AXI SRAM, 480 KB | rows of the capture | largest memory; written by the tick, read by the link |
 //! | AXI SRAM, 32 KB | DMA buffers | DMA1 and DMA2 do not reach the DTCM |

@@ -10,7 +10,7 @@
 
 use crate::board;
 use crate::flash::{Error as FlashError, SETTINGS, SettingsFlash};
-use model_core::control::{ControlConfig, ControlSettings};
+use model_core::control::{ControlConfig, ControlSettings, ObserverModel};
 use model_core::error::ParameterError;
 use rig_link::model::ModelRecord;
 use rig_link::settings::{ALL, SCHEMA_VERSION, SettingInfo, SettingState};
@@ -20,7 +20,7 @@ use sequential_storage::map::{MapConfig, MapStorage};
 const SCHEMA_KEY: u16 = 1;
 const MODEL_KEY: u16 = 2;
 /// The longest record, its key and the padding to whole flash words.
-const RECORD: usize = 128;
+const RECORD: usize = 512;
 
 type Map = MapStorage<u16, SettingsFlash, NoCache>;
 type StoreError = sequential_storage::Error<FlashError>;
@@ -47,7 +47,7 @@ impl From<StoreError> for Refused {
 }
 
 /// What was stored, as far as it could be read.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Stored {
     values: [Option<f32>; ALL.len()],
     model: Option<ModelRecord>,
@@ -64,10 +64,17 @@ impl Stored {
                 put(info, &mut settings, value)?;
             }
         }
-        if let Some(model) = &self.model {
-            settings.observer.model = model.into();
-        }
         Ok(settings)
+    }
+
+    /// The configuration they make, the model included.
+    fn config(&self) -> Result<ControlConfig, ParameterError> {
+        let settings = self.settings()?;
+        let mut config = settings.build()?;
+        if let Some(model) = &self.model {
+            config.set_model(&model.prepare(&settings)?);
+        }
+        Ok(config)
     }
 }
 
@@ -99,7 +106,7 @@ impl Settings {
     pub async fn load(flash: SettingsFlash) -> Self {
         let mut map = Map::new(flash, const { MapConfig::new(SETTINGS) }, NoCache::new());
         let stored = match read(&mut map).await {
-            Ok(stored) => match stored.settings().and_then(|settings| settings.build()) {
+            Ok(stored) => match stored.config() {
                 Ok(_) => Some(stored),
                 Err(error) => {
                     defmt::error!(
@@ -124,7 +131,8 @@ impl Settings {
                 None
             }
         };
-        Self { map, stored: stored.unwrap_or(Stored::NOTHING), intact: stored.is_some() }
+        let intact = stored.is_some();
+        Self { map, stored: stored.unwrap_or(Stored::NOTHING), intact }
     }
 
     /// Whether all that was stored could be read and is in range.
@@ -138,7 +146,7 @@ impl Settings {
     /// # Errors
     /// The defaults themselves are out of range.
     pub fn config(&self) -> Result<ControlConfig, ParameterError> {
-        self.stored.settings()?.build()
+        self.stored.config()
     }
 
     /// Counts per revolution of M2's encoder.
@@ -165,28 +173,26 @@ impl Settings {
         info: &SettingInfo,
         value: Option<f32>,
     ) -> Result<(Stored, ControlConfig), ParameterError> {
-        let mut stored = self.stored;
+        let mut stored = self.stored.clone();
         for (other, place) in ALL.iter().zip(&mut stored.values) {
             if other.key == info.key {
                 *place = value;
             }
         }
-        let config = stored.settings()?.build()?;
+        let config = stored.config()?;
         Ok((stored, config))
     }
 
-    /// What the configuration would be with this model, or with the default one.
-    pub fn with_model(&self, model: Option<ModelRecord>) -> Result<(Stored, ControlConfig), ParameterError> {
-        let stored = Stored { model, ..self.stored };
-        let config = stored.settings()?.build()?;
-        Ok((stored, config))
+    /// What the observer would run with this model stored, or with none.
+    pub fn with_model(&self, model: Option<&ModelRecord>) -> Result<ObserverModel, ParameterError> {
+        let settings = self.stored.settings()?;
+        model.unwrap_or(&ModelRecord::default()).prepare(&settings)
     }
 
-    /// The stored model, and the one in force.
+    /// The stored model.
     #[must_use]
-    pub fn model(&self) -> (Option<ModelRecord>, ModelRecord) {
-        let stored = self.stored.model;
-        (stored, stored.unwrap_or_else(|| (&defaults().observer.model).into()))
+    pub fn model(&self) -> Option<&ModelRecord> {
+        self.stored.model.as_ref()
     }
 
     /// Writes one value; `stored` is what [`Self::with_value`] gave for it.
@@ -202,15 +208,15 @@ impl Settings {
         Ok(())
     }
 
-    /// Writes the model; `stored` is what [`Self::with_model`] gave for it.
-    pub async fn keep_model(&mut self, model: Option<ModelRecord>, stored: Stored) -> Result<(), Refused> {
-        let mut buffer = [0; 64];
+    /// Writes the model, or that there is none.
+    pub async fn keep_model(&mut self, model: Option<ModelRecord>) -> Result<(), Refused> {
+        let mut buffer = [0; RECORD];
         let bytes: &[u8] = match &model {
             Some(model) => postcard::to_slice(model, &mut buffer).map_err(|_| Refused::Storage)?,
             None => &[],
         };
         self.write(MODEL_KEY, bytes).await?;
-        self.stored = stored;
+        self.stored.model = model;
         Ok(())
     }
 

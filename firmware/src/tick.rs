@@ -1,6 +1,6 @@
 //! The control tick: 10 000 times a second, in the interrupt at the end of the scan.
 //!
-//! TIM6 starts the scan; 4 µs later the scan's DMA interrupt runs the tick. TIM6's own interrupt, at the
+//! TIM6 starts the scan; 5 µs later the scan's DMA interrupt runs the tick. TIM6's own interrupt, at the
 //! same priority, only looks whether the period before it had its tick: if the scan did not come, it runs
 //! the tick with the old codes, so that the supervisor notices and acts. Nothing in here waits, locks,
 //! logs, allocates or formats. What goes out goes into queues with one reader and one writer, and

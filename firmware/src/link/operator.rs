@@ -3,7 +3,7 @@
 //! One request at a time, so what is prepared here and lent to the tick has one owner at any moment.
 
 use crate::handover::Handover;
-use crate::settings::{Refused as NotKept, Settings, Stored};
+use crate::settings::{Refused as NotKept, Settings};
 use crate::tick::{Carried, Order};
 use crate::{capture, restart, tick};
 use embassy_time::{Duration, Instant, Timer};
@@ -207,26 +207,18 @@ impl Operator {
     }
 
     async fn set_model(&mut self, model: Option<ModelRecord>) -> Answer {
-        let (stored, config): (Stored, ControlConfig) = match self.settings.with_model(model) {
-            Ok(new) => new,
+        let prepared = match self.settings.with_model(model.as_ref()) {
+            Ok(prepared) => prepared,
             Err(error) => return out_of_range(&error),
         };
-        if tick::mode() == Mode::Running.number() {
-            return Answer::Rejected(Rejection::NotDisabled);
-        }
-        if let Err(refused) = self.settings.keep_model(model, stored).await {
+        if let Err(refused) = self.settings.keep_model(model).await {
             return not_kept(&refused);
         }
+        self.config.set_model(&prepared);
         // The model alone: a swap of the whole configuration would forget the tare.
-        let observed = config.settings().observer.model;
-        let lent = match ObserverModel::new(&observed, config.settings().tick_s) {
-            Ok(prepared) => MODEL.lend(prepared),
-            Err(error) => return out_of_range(&error),
-        };
-        let Some(lent) = lent else { return Answer::Rejected(Rejection::NoTick) };
+        let Some(lent) = MODEL.lend(prepared) else { return Answer::Rejected(Rejection::NoTick) };
         let carried = self.ask(Order::Core(Core::SetModel(lent))).await;
         give_back(&MODEL, &carried);
-        self.config = config;
         carried.map_or_else(Answer::from, |()| self.model())
     }
 
@@ -241,8 +233,7 @@ impl Operator {
     }
 
     fn model(&self) -> Answer {
-        let (stored, active) = self.settings.model();
-        Answer::Model { stored, active }
+        Answer::Model(self.settings.model().cloned())
     }
 
     async fn erase(&mut self) -> Answer {

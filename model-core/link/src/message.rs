@@ -77,7 +77,7 @@ pub enum Command {
     SettingsErase,
     /// The observer's model.
     ModelGet,
-    /// Store a model and use it in the observer; only while disabled.
+    /// Store a model and use it in the observer from now on.
     ModelSet(ModelRecord),
     /// Forget the stored model and use the default.
     ModelForget,
@@ -149,13 +149,8 @@ pub enum Answer {
     Rejected(Rejection),
     /// A setting.
     Setting(SettingState),
-    /// The observer's model: the stored one, if there is one.
-    Model {
-        /// What is stored.
-        stored: Option<ModelRecord>,
-        /// What the observer runs.
-        active: ModelRecord,
-    },
+    /// The observer's stored model; without one it runs `ModelRecord::default()`.
+    Model(Option<ModelRecord>),
     /// The state of the capture.
     Capture(CaptureInfo),
     /// Bytes of the capture.

@@ -1,15 +1,42 @@
 //! The observer's friction model on the wire and in flash: the model file's numbers, nothing else.
+//!
+//! Effects travel under their ids and not by number, because a record in flash outlives the firmware
+//! that wrote it.
 
-use model_core::control::{ControlSettings, ModelParameters};
+use heapless::{String, Vec};
+use model_core::control::{ControlSettings, ModelParameters, ObserverModel};
+use model_core::error::ParameterError;
+use model_core::extension::{Extension, Extensions, MOST_VALUES};
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
 use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::StribeckParameters;
 use serde::{Deserialize, Serialize};
 
-/// A model by kind, with the parameters of the model file under their names there.
+/// The most effects of an uploaded model.
+pub const MOST_EFFECTS: usize = 4;
+
+/// A model: its kind with parameters, and the effects around it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelRecord {
+    /// The friction model.
+    pub friction: FrictionRecord,
+    /// What extends it.
+    pub effects: Vec<EffectRecord, MOST_EFFECTS>,
+}
+
+/// An effect of the library with its values, in the order of its names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectRecord {
+    /// Id in the model file.
+    pub id: String<24>,
+    /// Values of its parameters.
+    pub values: Vec<f32, MOST_VALUES>,
+}
+
+/// A friction model by kind, with the parameters of the model file under their names there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum ModelRecord {
+pub enum FrictionRecord {
     /// Brush with reset.
     Brush {
         /// Stiffness.
@@ -87,7 +114,7 @@ impl From<&BristleRecord> for LugreParameters<f32> {
     }
 }
 
-impl From<&ModelParameters> for ModelRecord {
+impl From<&ModelParameters> for FrictionRecord {
     fn from(model: &ModelParameters) -> Self {
         match model {
             ModelParameters::Brush(p) => Self::Brush { c_n_per_m: p.c_n_per_m, mu_s: p.mu_s, mu_c: p.mu_c },
@@ -102,15 +129,15 @@ impl From<&ModelParameters> for ModelRecord {
     }
 }
 
-impl From<&ModelRecord> for ModelParameters {
-    fn from(record: &ModelRecord) -> Self {
+impl From<&FrictionRecord> for ModelParameters {
+    fn from(record: &FrictionRecord) -> Self {
         match *record {
-            ModelRecord::Brush { c_n_per_m, mu_s, mu_c } => {
+            FrictionRecord::Brush { c_n_per_m, mu_s, mu_c } => {
                 Self::Brush(BrushParameters { c_n_per_m, mu_s, mu_c })
             }
-            ModelRecord::Lugre(bristles) => Self::Lugre((&bristles).into()),
-            ModelRecord::ModifiedLugre(bristles) => Self::ModifiedLugre((&bristles).into()),
-            ModelRecord::Series { k_u_n_per_m, c_u_n_s_per_m, bristles } => {
+            FrictionRecord::Lugre(bristles) => Self::Lugre((&bristles).into()),
+            FrictionRecord::ModifiedLugre(bristles) => Self::ModifiedLugre((&bristles).into()),
+            FrictionRecord::Series { k_u_n_per_m, c_u_n_s_per_m, bristles } => {
                 let bristles = (&bristles).into();
                 Self::Series(SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles })
             }
@@ -121,6 +148,25 @@ impl From<&ModelRecord> for ModelParameters {
 impl Default for ModelRecord {
     /// The model in the observer of a rig nobody has identified yet.
     fn default() -> Self {
-        (&ControlSettings::default().observer.model).into()
+        Self { friction: (&ControlSettings::default().observer.model).into(), effects: Vec::new() }
+    }
+}
+
+impl ModelRecord {
+    /// The model as the observer runs it, with the geometry and the control period of `settings`.
+    ///
+    /// # Errors
+    /// The parameter that is out of range, or an id that is no effect.
+    pub fn prepare(&self, settings: &ControlSettings) -> Result<ObserverModel, ParameterError> {
+        let mut effects = Extensions::none(settings.tick_s);
+        for record in &self.effects {
+            let effect = Extension::with_id(&record.id).ok_or(ParameterError {
+                name: "extension.id",
+                value: f64::NAN,
+                allowed: "the id of an effect that extends the friction model",
+            })?;
+            effects.set(effect, &record.values)?;
+        }
+        ObserverModel::extended(&(&self.friction).into(), effects, settings.geometry.friction_radius_m)
     }
 }

@@ -1,10 +1,12 @@
 //! The list of settings is sound, and an uploaded experiment is the one that was sent.
 #![allow(clippy::unwrap_used)]
-use model_core::control::{
-    ControlSettings, Experiment, M1Mode, M2Mode, ModelParameters, ObserverModel, Segment, Shape,
-};
+use heapless::String;
+use model_core::control::{ControlSettings, Experiment, M1Mode, M2Mode, ModelParameters, Segment, Shape};
+use model_core::extension::{Extension, MOST_VALUES};
 use rig_link::capture::CaptureRow;
-use rig_link::model::ModelRecord;
+use rig_link::frame::{MAX_FRAME, encode};
+use rig_link::message::{Command, Request};
+use rig_link::model::{EffectRecord, FrictionRecord, MOST_EFFECTS, ModelRecord};
 use rig_link::program::{Incomplete, Upload, header, segments};
 use rig_link::settings::{ALL, NotWhole, by_key, by_name};
 
@@ -117,19 +119,52 @@ fn a_capture_row_reads_back_from_its_bytes() {
 }
 
 #[test]
-fn a_model_goes_to_the_observer_and_back_unchanged() {
-    let ModelRecord::Series { bristles, .. } = ModelRecord::default() else { panic!("a series element") };
-    for record in [
-        ModelRecord::default(),
-        ModelRecord::Brush { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 },
-        ModelRecord::Lugre(bristles),
-        ModelRecord::ModifiedLugre(bristles),
+fn a_friction_model_goes_to_the_observer_and_back_unchanged() {
+    let settings = ControlSettings::default();
+    let FrictionRecord::Series { bristles, .. } = ModelRecord::default().friction else {
+        panic!("a series element")
+    };
+    for friction in [
+        ModelRecord::default().friction,
+        FrictionRecord::Brush { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 },
+        FrictionRecord::Lugre(bristles),
+        FrictionRecord::ModifiedLugre(bristles),
     ] {
-        let parameters = ModelParameters::from(&record);
-        assert_eq!(ModelRecord::from(&parameters), record);
-        assert!(ObserverModel::new(&parameters, 1e-4).is_ok());
+        assert_eq!(FrictionRecord::from(&ModelParameters::from(&friction)), friction);
+        let record = ModelRecord { friction, ..ModelRecord::default() };
+        assert!(record.prepare(&settings).is_ok());
     }
-    let broken = ModelRecord::Brush { c_n_per_m: 3e4, mu_s: 0.5, mu_c: 0.8 };
-    let refused = ObserverModel::new(&(&broken).into(), 1e-4);
-    assert_eq!(refused.map_err(|error| error.name), Err("mu_s"));
+    let friction = FrictionRecord::Brush { c_n_per_m: 3e4, mu_s: 0.5, mu_c: 0.8 };
+    let broken = ModelRecord { friction, ..ModelRecord::default() };
+    assert_eq!(broken.prepare(&settings).map_err(|error| error.name), Err("mu_s"));
+}
+
+#[test]
+fn an_extended_model_is_prepared_with_its_effects_or_says_what_is_wrong_with_them() {
+    let settings = ControlSettings::default();
+    let effect = |id: &str, values: &[f32]| EffectRecord {
+        id: String::try_from(id).unwrap(),
+        values: heapless::Vec::from_slice(values).unwrap(),
+    };
+    let with = |record: EffectRecord| {
+        let effects = heapless::Vec::from_slice(&[record]).unwrap();
+        ModelRecord { effects, ..ModelRecord::default() }.prepare(&settings)
+    };
+    let count = Extension::ViscousFilm.names().len();
+    let extended = with(effect("viscous_film", &vec![2.0; count])).unwrap();
+    assert_ne!(extended, ModelRecord::default().prepare(&settings).unwrap());
+    assert_eq!(with(effect("viscous_film", &[])).map_err(|error| error.name), Err("viscous_film"));
+    assert_eq!(with(effect("witchcraft", &[1.0])).map_err(|error| error.name), Err("extension.id"));
+}
+
+#[test]
+fn the_longest_model_fits_a_frame() {
+    let effect = EffectRecord {
+        id: String::try_from("encoder_eccentricity").unwrap(),
+        values: heapless::Vec::from_slice(&[1.0; MOST_VALUES]).unwrap(),
+    };
+    let effects = heapless::Vec::from_slice(&vec![effect; MOST_EFFECTS]).unwrap();
+    let model = ModelRecord { effects, ..ModelRecord::default() };
+    let request = Request { id: 1, command: Command::ModelSet(model) };
+    assert!(encode(&request, &mut [0; MAX_FRAME]).is_ok());
 }

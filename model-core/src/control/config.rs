@@ -92,7 +92,8 @@ impl ControlConfig {
         &self.settings
     }
 
-    pub(crate) fn set_model(&mut self, model: &ObserverModel) {
+    /// Puts a prepared model, extended or not, in the place of the one in the settings.
+    pub fn set_model(&mut self, model: &ObserverModel) {
         self.observer.set_model(model);
     }
 }
