@@ -10,8 +10,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use model_core::extension::adc_saturation::AdcSaturation;
 use model_core::extension::{ExtendedFriction, ExtendedInput, Extension, Extensions};
 
+use super::curve::shifted;
 use super::friction::{SOME_STEP_S, StepPlan};
-use super::inputs::{ContactInputs, ahead};
+use super::inputs::ContactInputs;
 use super::second_order::SecondOrder;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
@@ -88,7 +89,7 @@ pub(super) fn simulate(
         }
         shown.push(last_nm);
     }
-    let mut shown = ahead(&inputs.time_s, &shown, -delay_s);
+    let mut shown = shifted(&inputs.time_s, &shown, -delay_s);
     if let Some(clipping) = clipping {
         shown.iter_mut().for_each(|torque_nm| *torque_nm = clipping.shown_nm(*torque_nm));
     }

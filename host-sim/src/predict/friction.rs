@@ -11,9 +11,9 @@ use model_core::friction::stribeck::Stribeck;
 use model_core::friction::{Contact, FrictionModel, FrictionState};
 
 use super::bridge::BridgeModel;
+use super::curve::Curve;
 use super::extended;
 use super::inputs::ContactInputs;
-use crate::files::log::slope;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::{Bridge, RigFile};
 use crate::input_error::InputError;
@@ -183,41 +183,6 @@ impl SinceTurn {
         let winding = self.distance_m < WINDING_REACHES * reach_m;
         self.distance_m += slid_m;
         if winding && reach_m > 0.0 { slid_m / reach_m * STEPS_PER_REACH } else { 0.0 }
-    }
-}
-
-/// A cubic through the samples with the slopes of parabolas through neighbours.
-struct Curve<'a> {
-    time_s: &'a [f64],
-    values: &'a [f64],
-    slopes: Vec<f64>,
-}
-
-/// Its piece between two samples: c0 + c1 s + c2 s² + c3 s³, s from 0 to 1.
-struct Piece([f64; 4]);
-
-impl<'a> Curve<'a> {
-    fn new(time_s: &'a [f64], values: &'a [f64]) -> Self {
-        Self { time_s, values, slopes: slope(time_s, values) }
-    }
-
-    fn piece(&self, i: usize) -> Piece {
-        let span_s = self.time_s[i + 1] - self.time_s[i];
-        let (x0, x1) = (self.values[i], self.values[i + 1]);
-        let (d0, d1) = (span_s * self.slopes[i], span_s * self.slopes[i + 1]);
-        Piece([x0, d0, 3.0 * (x1 - x0) - 2.0 * d0 - d1, 2.0 * (x0 - x1) + d0 + d1])
-    }
-}
-
-impl Piece {
-    fn at(&self, s: f64) -> f64 {
-        let [a, b, c, d] = self.0;
-        a + s * (b + s * (c + s * d))
-    }
-
-    fn area(&self, s: f64) -> f64 {
-        let [a, b, c, d] = self.0;
-        s * (a + s * (b / 2.0 + s * (c / 3.0 + s * d / 4.0)))
     }
 }
 

@@ -9,6 +9,7 @@
 //! The residual is measured minus predicted; nrmse = RMS(residual)/RMS(measured).
 
 mod bridge;
+pub mod curve;
 mod drive;
 mod extended;
 mod friction;
