@@ -5,6 +5,7 @@
 
 pub mod common;
 mod predict;
+mod simulate;
 
 pub mod progress;
 
@@ -53,6 +54,7 @@ macro_rules! commands {
 
 commands! {
     Predict(predict::Predict),
+    Simulate(simulate::Simulate),
 }
 
 /// Runs the tool with the arguments of the process.

@@ -126,15 +126,15 @@ pub enum Study {
 /// What the plant behind the control core does beyond the rig file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlantOptions {
-    /// Sensor noise, quantisation by converters and encoders.
+    /// Noise of the sensors. Converters and encoders quantise in any case.
     pub sensor_noise: bool,
-    /// Integration steps of the plant in each control period.
+    /// Integration steps of the plant in a control period in which load or slip change fast.
     pub substeps: u32,
 }
 
 impl Default for PlantOptions {
     fn default() -> Self {
-        Self { sensor_noise: true, substeps: 20 }
+        Self { sensor_noise: true, substeps: 16 }
     }
 }
 

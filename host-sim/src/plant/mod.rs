@@ -19,6 +19,7 @@ mod bridge;
 mod disc;
 mod elements;
 mod encoder;
+mod from_files;
 mod linear;
 mod noise;
 pub mod parameters;

@@ -23,7 +23,7 @@ pub struct PlantParameters {
     pub pressure: PressureParameters,
     /// Torque ring and its amplifier.
     pub friction_bridge: BridgeParameters,
-    /// Frame and its amplifier.
+    /// Frame and its amplifier; the frame's own mode is that of the pressure.
     pub normal_bridge: BridgeParameters,
     /// Counts of one revolution of either encoder.
     pub counts_per_rev: u32,
@@ -183,7 +183,7 @@ impl Default for PlantParameters {
             shaft: None,
             pressure: PressureParameters::default(),
             friction_bridge: BridgeParameters::default(),
-            normal_bridge: BridgeParameters::default(),
+            normal_bridge: BridgeParameters { mode: None, lowpass_hz: Some(1000.0) },
             counts_per_rev: 480_000,
             analogue: AnalogueParameters::default(),
             noise: NoiseParameters::default(),

@@ -132,7 +132,7 @@ mod tests {
     }
 
     fn torque_loop(trim_bandwidth_hz: f32) -> TorqueLoop {
-        TorqueLoop::new(&DriveSettings { trim_bandwidth_hz, ..ControlSettings::default().m1 }, TICK_S)
+        TorqueLoop::new(&DriveSettings { trim_bandwidth_hz, ..DriveSettings::default() }, TICK_S)
     }
 
     fn run(torque_loop: &TorqueLoop, drive: &mut Drive, state: &mut TorqueState, wanted_nm: f32, ticks: u32) {

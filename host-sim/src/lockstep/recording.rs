@@ -1,0 +1,114 @@
+//! What a run leaves: the core's record of every tick, and the truth at the same instant.
+
+use crate::files::log::Log;
+use crate::files::signal::Signal;
+use crate::plant::{PERIOD_S, Truth};
+use model_core::control::{Fault, LimitSet, Record};
+
+/// One tick of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// What the core reported.
+    pub record: Record,
+    /// What really was at the sampling instant.
+    pub truth: Truth,
+}
+
+/// A run of an experiment at the full control rate; frame `k` belongs to the time `k · 100 µs`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recording {
+    /// All ticks while the experiment ran.
+    pub frames: Vec<Frame>,
+    /// The fault that ended the run early.
+    pub fault: Option<Fault>,
+    /// Limits that acted at least once.
+    pub limits: LimitSet,
+    /// Ticks from power-on to the end, start-up included.
+    pub control_ticks: u64,
+    /// Ticks that ended late, as the core counted them.
+    pub deadline_misses: u64,
+}
+
+impl Recording {
+    /// Time of a frame since the start of the experiment.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)]
+    pub fn time_s(&self, frame: usize) -> f64 {
+        // Dividing by a whole number gives the nearest f64 to the decimal time.
+        frame as f64 / (1.0 / PERIOD_S).round()
+    }
+
+    /// One signal over all frames.
+    pub fn column(&self, signal: impl Fn(&Frame) -> f64) -> Vec<f64> {
+        self.frames.iter().map(signal).collect()
+    }
+
+    /// The log as the host tool writes it from telemetry: each `every`-th tick. Angles come from exact counts;
+    /// numbers of single precision are written with the digits they have.
+    #[must_use]
+    pub fn log(&self, every: usize, counts_per_rev: u32) -> Log {
+        self.table(every, counts_per_rev, widen)
+    }
+
+    /// All ticks as signals for a computation: like [`Self::log`], but not prepared for being written.
+    #[must_use]
+    pub fn signals(&self, counts_per_rev: u32) -> Log {
+        self.table(1, counts_per_rev, f64::from)
+    }
+
+    fn table(&self, every: usize, counts_per_rev: u32, double: fn(f32) -> f64) -> Log {
+        let picked = || self.frames.iter().step_by(every.max(1));
+        let single = |f: fn(&Record) -> f32| picked().map(|x| double(f(&x.record))).collect::<Vec<_>>();
+        let angle =
+            |f: fn(&Record) -> i64| picked().map(|x| angle_rad(f(&x.record), counts_per_rev)).collect();
+        let mut log = Log::default();
+        let times = (0..self.frames.len()).step_by(every.max(1)).map(|k| self.time_s(k));
+        log.set_signal(Signal::Time, times.collect());
+        log.set_signal(Signal::M1TorqueRef, single(|r| r.m1_torque_ref_nm));
+        log.set_signal(Signal::M1Torque, single(|r| r.m1_torque_nm));
+        log.set_signal(Signal::M1Angle, angle(|r| r.m1_count));
+        log.set_signal(Signal::M2TorqueRef, single(|r| r.m2_torque_ref_nm));
+        log.set_signal(Signal::M2Torque, single(|r| r.m2_torque_nm));
+        log.set_signal(Signal::M2Angle, angle(|r| r.m2_count));
+        log.set_signal(Signal::M2Speed, single(|r| r.m2_speed_rad_s));
+        log.set_signal(Signal::NormalForce, single(|r| r.normal_force_n));
+        log.set_signal(Signal::FrictionTorque, single(|r| r.friction_torque_nm));
+        log.set_numbers("m2_speed_ref_rad_s", single(|r| r.m2_speed_ref_rad_s));
+        log.set_numbers("predicted_friction_torque_nm", single(|r| r.predicted_friction_torque_nm));
+        log
+    }
+}
+
+/// The shortest decimal that names this `f32`, as `f64`: what stands in a log is then as short as what was measured.
+fn widen(value: f32) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return f64::from(value);
+    }
+    let mut buffer = ryu::Buffer::new();
+    buffer.format_finite(value).parse().unwrap_or_else(|_| f64::from(value))
+}
+
+/// Angle of a count, rounded to a thousandth of a count so that it is short in a log.
+#[allow(clippy::cast_precision_loss)]
+fn angle_rad(count: i64, counts_per_rev: u32) -> f64 {
+    let angle = count as f64 * std::f64::consts::TAU / f64::from(counts_per_rev.max(1));
+    (angle * 1e9).round() / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_numbers_stay_short() {
+        assert_eq!(widen(0.1f32), 0.1);
+        assert_eq!(widen(-88.0f32), -88.0);
+        assert_eq!(widen(0.0), 0.0);
+    }
+
+    #[test]
+    fn a_count_becomes_its_angle() {
+        assert_eq!(angle_rad(120_000, 480_000), 1.570_796_327);
+        assert_eq!(angle_rad(-480_000 * 7, 480_000), -43.982_297_150);
+    }
+}

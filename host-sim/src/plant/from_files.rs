@@ -1,0 +1,96 @@
+//! The plant that a rig file and a model file describe.
+
+use super::elements::ElementParameters;
+use super::parameters::{
+    BearingParameters, BridgeParameters, DiscParameters, DriveParameters, GeometryParameters, ModeParameters,
+    NoiseParameters, PlantParameters, PressureParameters, ShaftParameters, Substeps,
+};
+use crate::files::experiment_file::PlantOptions;
+use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::rig_file::{Bridge, Motor, RigFile};
+use model_core::friction::brush::BrushParameters;
+use model_core::friction::lugre::LugreParameters;
+use model_core::friction::series::SeriesParameters;
+use model_core::friction::stribeck::StribeckParameters;
+
+impl PlantParameters {
+    /// The plant of a rig with elements of a model. What neither file names keeps its assumed value.
+    #[must_use]
+    pub fn from_files(rig: &RigFile, model: &ModelFile, options: &PlantOptions) -> Self {
+        let assumed = Self::default();
+        let motor =
+            |m: &Motor| DriveParameters { rated_torque_nm: m.rated_torque_nm, torque_lag_s: m.torque_lag_s };
+        let bridge = |b: &Bridge| BridgeParameters {
+            mode: b.mode.map(|m| ModeParameters { mode_hz: m.mode_hz, damping_ratio: m.damping_ratio }),
+            lowpass_hz: b.lowpass_hz,
+        };
+        Self {
+            geometry: GeometryParameters {
+                friction_radius_m: rig.friction_radius_m,
+                lever_gain_n_per_nm: rig.lever_gain_n_per_nm,
+                mechanism_stiffness_n_per_rad: rig.m1_stiffness_n_per_rad,
+            },
+            m1: motor(&rig.m1),
+            m2: motor(&rig.m2),
+            disc: DiscParameters { inertia_kg_m2: rig.m2_inertia_kg_m2, ..assumed.disc },
+            bearing: BearingParameters {
+                coulomb_nm: rig.bearing_coulomb_nm,
+                viscous_nm_s: rig.bearing_viscous_nm_s_per_rad,
+                ..assumed.bearing
+            },
+            shaft: rig.shaft.map(|s| ShaftParameters {
+                stiffness_nm_per_rad: s.stiffness_nm_per_rad,
+                damping_nm_s: s.damping_nm_s_per_rad,
+                backlash_rad: s.backlash_rad,
+                motor_inertia_kg_m2: s.motor_inertia_kg_m2,
+            }),
+            pressure: PressureParameters {
+                preload_n: rig.preload_n,
+                mode_hz: rig.pressure.mode_hz,
+                damping_ratio: rig.pressure.damping_ratio,
+            },
+            friction_bridge: bridge(&rig.friction_bridge),
+            normal_bridge: bridge(&rig.normal_bridge),
+            counts_per_rev: rig.pulses_per_rev.saturating_mul(4),
+            noise: if options.sensor_noise { assumed.noise } else { NoiseParameters::none() },
+            substeps: Substeps { busy: options.substeps, ..assumed.substeps },
+            elements: ElementParameters::from_file(model),
+            ..assumed
+        }
+    }
+}
+
+impl ElementParameters {
+    /// The parameters of a model file, without its extensions.
+    #[must_use]
+    pub fn from_file(model: &ModelFile) -> Self {
+        // A name that a kind does not have is never asked for below; the model refuses what is not a number.
+        let value = |name| model.get(name).unwrap_or(f64::NAN);
+        let lugre = || LugreParameters {
+            sigma0_n_per_m: value("sigma0_n_per_m"),
+            sigma1_n_s_per_m: value("sigma1_n_s_per_m"),
+            a2_s_per_m: value("a2_s_per_m"),
+            stribeck: StribeckParameters {
+                a0: value("a0"),
+                a1: value("a1"),
+                v0_m_s: value("v0_m_s"),
+                delta: value("delta"),
+                theta: value("theta"),
+            },
+        };
+        match model.kind {
+            ModelKind::Brush => Self::Brush(BrushParameters {
+                c_n_per_m: value("c_n_per_m"),
+                mu_s: value("mu_s"),
+                mu_c: value("mu_c"),
+            }),
+            ModelKind::Lugre => Self::Lugre(lugre()),
+            ModelKind::ModifiedLugre => Self::ModifiedLugre(lugre()),
+            ModelKind::Series => Self::Series(SeriesParameters {
+                k_u_n_per_m: value("k_u_n_per_m"),
+                c_u_n_s_per_m: value("c_u_n_s_per_m"),
+                bristles: lugre(),
+            }),
+        }
+    }
+}
