@@ -16,8 +16,6 @@ use crate::error::ParameterError;
 
 /// How long the disc must be still before it is at rest.
 const REST_TIME_S: f32 = 0.05;
-/// Half of a blink of a lamp.
-const BLINK_TIME_S: f32 = 0.25;
 
 /// What the step reads. Built by [`ControlSettings::build`] and swapped whole.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +36,6 @@ pub struct ControlConfig {
     pub(crate) guard: Guard,
     pub(crate) timing: Timing,
     pub(crate) observer: Observer,
-    pub(crate) blink_ticks: u64,
 }
 
 impl ControlSettings {
@@ -80,7 +77,6 @@ impl ControlSettings {
                 rest_ticks: ticks(REST_TIME_S),
             },
             observer: Observer::new(&self.observer, self.geometry.friction_radius_m, dt)?,
-            blink_ticks: u64::from(ticks(BLINK_TIME_S).max(1)),
         })
     }
 }

@@ -30,6 +30,9 @@ use crate::extension::ExtendedInput;
 /// Torque of M1 below which the contact counts as left alone, for a tare.
 const M1_AT_REST_NM: f32 = 0.2;
 
+/// Half of a blink of a lamp, as a bit of the tick counter: 0.2 s at 10 kHz.
+const BLINK_TICKS: u64 = 1 << 11;
+
 /// What the motors are asked for while they are brought to rest.
 const STOP: Demand = Demand { m1_torque_nm: 0.0, m2_mode: M2Mode::Speed, m2: 0.0 };
 
@@ -298,8 +301,8 @@ impl ControlState {
         }
     }
 
-    fn leds(&self, config: &ControlConfig) -> Leds {
-        let blink = (self.tick / config.blink_ticks) & 1 == 0;
+    fn leds(&self) -> Leds {
+        let blink = self.tick & BLINK_TICKS == 0;
         let mode = self.mode();
         let hindered = !self.supervisor.causes().is_empty();
         Leds {
@@ -409,7 +412,7 @@ pub fn step(config: &ControlConfig, state: &mut ControlState, samples: &Samples)
         [DAC_ZERO; 2]
     };
     let record = state.record(config, &m, &commands, limits, &observed);
-    let outputs = Outputs { dac, drive_enable: [mode.is_live(); 2], leds: state.leds(config), record };
+    let outputs = Outputs { dac, drive_enable: [mode.is_live(); 2], leds: state.leds(), record };
     state.tick = state.tick.wrapping_add(1);
     outputs
 }
