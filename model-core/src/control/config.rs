@@ -106,12 +106,12 @@ impl Dac {
         Self { codes_per_nm: if drive.reversed { -codes_per_nm } else { codes_per_nm } }
     }
 
-    /// The nearest code. Conversion to an integer saturates, and not a number gives 0 on its way to the safe code.
+    /// The nearest code; what is no number is zero torque.
     pub(crate) fn code(&self, torque_nm: f32) -> u16 {
-        if !torque_nm.is_finite() {
+        let code = f32::from(DAC_ZERO) + torque_nm * self.codes_per_nm + 0.5;
+        if code.is_nan() {
             return DAC_ZERO;
         }
-        let code = f32::from(DAC_ZERO) + torque_nm * self.codes_per_nm + 0.5;
         // `as` rounds towards zero and saturates at both ends.
         (code as u16).min(DAC_MAX)
     }
@@ -137,5 +137,6 @@ mod tests {
             (2048, 2049, 2048, 2047)
         );
         assert_eq!(plain.code(f32::NAN), DAC_ZERO);
+        assert_eq!(Dac { codes_per_nm: f32::INFINITY }.code(0.0), DAC_ZERO);
     }
 }

@@ -257,10 +257,15 @@ mod tests {
     }
 
     #[test]
-    fn speed_beyond_the_possible_is_a_jump() {
-        let encoder = encoder(32);
-        let mut state = EncoderState::default();
-        encoder.step(&mut state, 0);
-        assert!(encoder.step(&mut state, 1000).jump);
+    fn speed_beyond_the_possible_is_a_jump_however_it_is_reached() {
+        // 60 rad/s are 458 counts a tick, and 3 for sampling.
+        let (encoder, mut state) = (encoder(32), EncoderState::default());
+        let mut raw = 0_u32;
+        encoder.step(&mut state, raw);
+        let first = (1..1000_u32).find(|step| {
+            raw = raw.wrapping_add(*step);
+            encoder.step(&mut state, raw).jump
+        });
+        assert_eq!(first, Some(462));
     }
 }

@@ -173,3 +173,40 @@ impl M2State {
         self.speed_ref_rad_s
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// First command of a speed step, with a slew limit of the torque that does not act.
+    fn first_command(wanted: f32, friction_torque_nm: f32) -> f32 {
+        let mut settings = ControlSettings::default();
+        settings.m2.slew_nm_per_s = 1e5;
+        let m2 = M2::new(&settings);
+        let (mut state, mut limits) = (M2State::default(), LimitSet::EMPTY);
+        let measured = M2Measured { friction_torque_nm, ..M2Measured::default() };
+        m2.step(&mut state, M2Mode::Speed, wanted, &measured, &mut limits).command_nm
+    }
+
+    #[test]
+    fn the_first_command_is_the_feed_forward_of_inertia_bearing_and_friction_with_their_signs() {
+        // J · 100 rad/s² = 2, Coulomb 0.15, viscous 0.005 · 0.01, Kp · 0.01 rad/s = 2 · 157 · 0.02 · 0.01 = 0.0628.
+        let ramp_nm = 2.0 + 0.15 + 5e-5 + 0.062_83;
+        for sign in [1.0, -1.0] {
+            let got = first_command(sign * 10.0, 0.0);
+            assert!((got - sign * ramp_nm).abs() < 1e-4, "{sign}: {got}");
+        }
+        // The friction is part of what the state is taken over from, so at first it moves nothing.
+        assert!((first_command(10.0, 1.0) - ramp_nm).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_torque_limits_fold_back_only_the_torque_that_drives_on() {
+        let m2 = M2::new(&ControlSettings::default());
+        assert_eq!(m2.span_at(30.0), Span::symmetric(8.0));
+        let half = m2.span_at(0.5 * (31.5 + 34.0));
+        assert!((half.high - 4.0).abs() < 1e-4 && half.low == -8.0, "{half:?}");
+        let gone = m2.span_at(-40.0);
+        assert!(gone.low == 0.0 && gone.high == 8.0, "{gone:?}");
+    }
+}

@@ -250,4 +250,10 @@ fn limits_are_told_once_a_run_and_shown_in_every_tick() {
     assert!((r.m1_torque_ref_nm - 3.6).abs() < 1e-5 && (r.m2_speed_ref_rad_s - 10.0).abs() < 1e-5);
     let told = |limit| bench.events.iter().filter(|e| e.kind == EventKind::LimitReached(limit)).count();
     assert_eq!((told(Limit::NormalForce), told(Limit::SpeedReference)), (1, 1));
+    bench.apply(Command::Stop).unwrap();
+    bench.run(1.0);
+    bench.apply(Command::Start).unwrap();
+    bench.run(0.5);
+    let told = |limit| bench.events.iter().filter(|e| e.kind == EventKind::LimitReached(limit)).count();
+    assert_eq!((told(Limit::NormalForce), told(Limit::SpeedReference)), (2, 2), "again in the next run");
 }

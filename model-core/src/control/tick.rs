@@ -19,7 +19,7 @@ use super::limit::LimitSet;
 use super::m1::MotorCommand;
 use super::m2::{M2Measured, M2State};
 use super::observer::{Observed, ObserverState};
-use super::outputs::{DAC_ZERO, Leds, Outputs, Record};
+use super::outputs::{Leds, Outputs, Record};
 use super::samples::Samples;
 use super::sequencer::{Demand, M2Mode, Sequencer, SequencerState};
 use super::speed::SpeedState;
@@ -406,11 +406,7 @@ pub fn step(config: &ControlConfig, state: &mut ControlState, samples: &Samples)
     if !mode.has_torque() {
         state.sequencer.stop();
     }
-    let dac = if mode.has_torque() {
-        [config.m1_dac.code(commands[0].command_nm), config.m2_dac.code(commands[1].command_nm)]
-    } else {
-        [DAC_ZERO; 2]
-    };
+    let dac = [config.m1_dac.code(commands[0].command_nm), config.m2_dac.code(commands[1].command_nm)];
     let record = state.record(config, &m, &commands, limits, &observed);
     let outputs = Outputs { dac, drive_enable: [mode.is_live(); 2], leds: state.leds(), record };
     state.tick = state.tick.wrapping_add(1);
