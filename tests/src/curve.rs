@@ -48,9 +48,10 @@ pub struct Asymmetry {
 impl Asymmetry {
     /// Draws an asymmetry.
     pub fn draw(s: &mut Stream) -> Self {
+        let side = s.sign();
         Self {
-            coulomb_share: s.signed(0.06, 0.14),
-            falling_share: s.signed(0.03, 0.25),
+            coulomb_share: side * s.uniform(0.07, 0.15),
+            falling_share: side * s.uniform(-0.05, 0.25),
             join_m_s: s.uniform(1e-3, 4e-3),
         }
     }

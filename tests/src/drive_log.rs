@@ -194,9 +194,11 @@ fn csv(rows: &[(f64, f64, f64)], form: Form, noise: &Noise, units: Units, s: &mu
 
 /// Generates a drive case; the scenario must have been checked.
 pub(crate) fn drive_case(scenario: &Scenario) -> GeneratedCase {
-    let seed = scenario.seed;
+    // A linear stage is another machine, not the rotary drive in other units.
+    let linear = scenario.form == Form::LinearStage;
+    let seed = if linear { !scenario.seed } else { scenario.seed };
     let rig = Rig::draw(seed);
-    let units = if scenario.form == Form::LinearStage { Units::LINEAR } else { Units::ROTARY };
+    let units = if linear { Units::LINEAR } else { Units::ROTARY };
     let setting = Setting { rig: &rig, rate_hz: scenario.rate_hz, greatest_normal_n: 0.0, units };
     let laws = Laws::draw(&scenario.effects, seed, &setting);
     let numbers = DriveNumbers {
@@ -235,7 +237,7 @@ pub(crate) fn drive_case(scenario: &Scenario) -> GeneratedCase {
         model_toml: String::new(),
         truth: Truth {
             effects: scenario.effects.clone(),
-            seed,
+            seed: scenario.seed,
             rate_hz: scenario.rate_hz,
             noise_factor: scenario.noise_factor,
             baseline_kind: "drive".to_owned(),

@@ -5,6 +5,8 @@
 
 use serde::{Serialize, Serializer};
 
+use crate::random::Stream;
+
 /// Part of the rig that an effect sits in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -149,16 +151,40 @@ impl Effect {
     /// Whether a drive without contact can show it.
     #[must_use]
     pub fn works_without_contact(self) -> bool {
-        self.subsystem() == Subsystem::Drive && self != Self::ThrustBearing
+        // A loss of torque constant hardly shows where only the bearing asks for torque at speed.
+        self.subsystem() == Subsystem::Drive && !matches!(self, Self::ThrustBearing | Self::TorqueSag)
     }
 
-    /// Whether two effects can be told apart in principle when both are there at once.
+    fn is_pair(self, other: Self, a: Self, b: Self) -> bool {
+        (self == a && other == b) || (self == b && other == a)
+    }
+
+    /// Whether a log can hide both at once.
     #[must_use]
     pub fn goes_with(self, other: Self) -> bool {
-        use Effect::{BellCurve, DirectionAsymmetry, ElementCompliance, RubberRelaxation};
-        let both = |a, b| (self == a && other == b) || (self == b && other == a);
         // The relaxing block needs a baseline with a block; the bell replaces the falling curve.
-        self != other && !both(ElementCompliance, RubberRelaxation) && !both(BellCurve, DirectionAsymmetry)
+        self != other
+            && !self.is_pair(other, Self::ElementCompliance, Self::RubberRelaxation)
+            && !self.is_pair(other, Self::BellCurve, Self::DirectionAsymmetry)
+    }
+
+    /// Whether two effects that go together can be told apart in one log.
+    #[must_use]
+    pub fn tells_apart_from(self, other: Self) -> bool {
+        // Play sits in the soft shaft; an uneven Coulomb part is an offset while the disc turns.
+        self.goes_with(other)
+            && !self.is_pair(other, Self::ShaftTorsion, Self::Backlash)
+            && !self.is_pair(other, Self::BearingAsymmetry, Self::TorqueOffset)
+    }
+
+    /// Two nameable effects that can be told apart, by the seed.
+    #[must_use]
+    pub fn random_pair(seed: u64) -> [Self; 2] {
+        let mut s = Stream::new(seed, "pair");
+        let known = Self::known();
+        let first = s.pick(&known);
+        let rest: Vec<Self> = known.into_iter().filter(|other| first.tells_apart_from(*other)).collect();
+        [first, s.pick(&rest)]
     }
 }
 

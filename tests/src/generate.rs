@@ -113,9 +113,16 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
         .collect();
 
     let noise = Noise::draw(seed, scenario.noise_factor);
-    let residuals: Vec<_> = logs.iter().map(|log| log.residual).collect();
+    let mut residuals: Vec<_> = logs.iter().map(|log| log.residual).collect();
     let samples: Vec<_> = logs.into_iter().map(|log| log.samples).collect();
     let clip = laws.adc_saturation.as_ref().map(|law| Clip::new(law, &samples));
+    if let Some(clip) = &clip {
+        for (residual, samples) in residuals.iter_mut().zip(&samples) {
+            let (friction, normal) = clip.lost(samples);
+            residual.friction_nm = residual.friction_nm.hypot(friction);
+            residual.normal_n = residual.normal_n.hypot(normal);
+        }
+    }
     let mut texts: Vec<String> = samples
         .iter()
         .enumerate()

@@ -75,6 +75,28 @@ impl Clip {
         let index = (saturation.unclipped_share * sizes.len() as f64) as usize;
         Self { channel: saturation.channel, level: sizes.get(index).copied().unwrap_or(0.0) }
     }
+
+    /// A sample's friction torque and normal force as the converter gives them.
+    #[must_use]
+    pub fn read(&self, friction_nm: f64, normal_n: f64) -> (f64, f64) {
+        match self.channel {
+            Clipped::Friction => (friction_nm.clamp(-self.level, self.level), normal_n),
+            Clipped::Normal => (friction_nm, normal_n.min(self.level)),
+        }
+    }
+
+    /// RMS of what is lost of friction torque and normal force in a log.
+    #[must_use]
+    pub fn lost(&self, samples: &[Sample]) -> (f64, f64) {
+        let (mut friction, mut normal) = (0.0, 0.0);
+        for sample in samples {
+            let (f, n) = self.read(sample.friction_torque_nm, sample.normal_force_n);
+            friction += (sample.friction_torque_nm - f).powi(2);
+            normal += (sample.normal_force_n - n).powi(2);
+        }
+        let count = samples.len().max(1) as f64;
+        ((friction / count).sqrt(), (normal / count).sqrt())
+    }
 }
 
 fn converted(value: f64, span: f64) -> f64 {
@@ -104,10 +126,8 @@ pub fn contact_csv(
     for sample in samples {
         let mut friction = sample.friction_torque_nm + noise.friction_nm * s.normal();
         let mut normal = sample.normal_force_n + noise.normal_n * s.normal();
-        match clip {
-            Some(Clip { channel: Clipped::Friction, level }) => friction = friction.clamp(-level, *level),
-            Some(Clip { channel: Clipped::Normal, level }) => normal = normal.min(*level),
-            None => {}
+        if let Some(clip) = clip {
+            (friction, normal) = clip.read(friction, normal);
         }
         let jitter = noise.angle_counts / COUNTS_PER_RAD;
         let row = [

@@ -1,5 +1,7 @@
 //! The reference rig against physics and against itself.
 
+#![allow(clippy::unwrap_used)]
+
 use rig_tests::reference_rig::{ReferenceRig, ReferenceState, Solver};
 
 /// A disc that nothing slows down, turning at a speed under a constant load: the claims about the series

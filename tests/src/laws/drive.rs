@@ -141,8 +141,8 @@ impl Uneven {
     /// Draws one. The viscous part is never small: an uneven Coulomb part alone is a torque offset.
     pub fn draw(s: &mut Stream, units: Units) -> Self {
         Self {
-            coulomb_share: s.signed(0.15, 0.4),
-            viscous: s.signed(0.008, 0.016) * units.torque / units.travel,
+            coulomb_share: s.signed(0.2, 0.45),
+            viscous: s.signed(0.011, 0.02) * units.torque / units.travel,
         }
     }
 }

@@ -106,7 +106,7 @@ pub struct Eccentricity {
 impl Eccentricity {
     /// Draws one.
     pub fn draw(s: &mut Stream) -> Self {
-        Self { share: s.uniform(0.03, 0.065), phase_rad: s.phase() }
+        Self { share: s.uniform(0.05, 0.09), phase_rad: s.phase() }
     }
 
     /// Read angle at a true one.
