@@ -12,9 +12,9 @@
 //! * **normal_settled_time_s** is when the normal force enters the band of ±5 % around its settled value for
 //!   the last time.
 //! * **friction_ratio_at_same_normal**: after the friction peak the normal force leaves the value it had there
-//!   (by more than 2.5 %, half of the band that counts as settled); when it next crosses that value, friction then over friction at the peak. A
-//!   normal force that never leaves has the value all along: then it is settled over peak. Null where it leaves
-//!   and does not come back.
+//!   (by more than 2.5 %, half of the band that counts as settled); when it next crosses that value,
+//!   friction then over friction at the peak. A normal force that never leaves has the value all along:
+//!   then it is settled over peak. Null where it leaves and does not come back.
 //! * **friction_coefficient_ratio** = (settled friction/settled normal force)/(the same at the friction peak).
 //! * **loop_energy_j**: ∮ T dθ of friction torque over disc angle, mean of the whole periods of M2's torque sine
 //!   but the first.
