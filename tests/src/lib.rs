@@ -26,4 +26,4 @@ pub mod truth;
 
 pub use effect::Effect;
 pub use generate::generate;
-pub use scenario::{Base, Form, GeneratedCase, Plan, Scenario, ScenarioError};
+pub use scenario::{Base, CasePaths, Form, GeneratedCase, Plan, Scenario, ScenarioError};

@@ -71,7 +71,7 @@ impl Rig {
             preload_n: about(8.0, 0.25),
             pressure_mode_hz: about(120.0, 0.15),
             pressure_damping: about(0.25, 0.2),
-            mechanism_n_per_rad: about(70.0, 0.3),
+            mechanism_n_per_rad: 0.0,
             bearing_coulomb_nm: about(0.17, 0.35),
             bearing_viscous_nm_s: about(0.006, 0.4),
             friction_bridge: Some(Bridge {
@@ -88,6 +88,8 @@ impl Rig {
         if s.chance(0.4) {
             rig.normal_bridge = None;
         }
+        // From a spindle that turns most of a revolution to a lever that hardly turns M1 at all.
+        rig.mechanism_n_per_rad = rounded(s.log_uniform(50.0, 3000.0), 4);
         rig
     }
 }

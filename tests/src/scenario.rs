@@ -1,6 +1,7 @@
 //! What is asked of the generator, and what it gives back.
 
 use std::fmt;
+use std::path::{Path, PathBuf};
 
 use crate::effect::Effect;
 
@@ -127,4 +128,46 @@ pub struct GeneratedCase {
     pub model_toml: String,
     /// The answer.
     pub truth: crate::truth::Truth,
+}
+
+impl GeneratedCase {
+    /// Writes the case to a folder, which is made if it is not there: `train1.csv` …, `holdout.csv`, and
+    /// `rig.toml` and `model.toml` where the case has them. The truth is not written. Gives the paths.
+    ///
+    /// # Errors
+    /// Where the folder or a file cannot be written.
+    pub fn write(&self, folder: &Path) -> std::io::Result<CasePaths> {
+        std::fs::create_dir_all(folder)?;
+        let put = |name: &str, text: &str| {
+            let path = folder.join(name);
+            std::fs::write(&path, text).map(|()| path)
+        };
+        let train = self
+            .train
+            .iter()
+            .enumerate()
+            .map(|(i, text)| put(&format!("train{}.csv", i + 1), text))
+            .collect::<Result<_, _>>()?;
+        let maybe =
+            |name: &str, text: &str| if text.is_empty() { Ok(None) } else { put(name, text).map(Some) };
+        Ok(CasePaths {
+            train,
+            holdout: put("holdout.csv", &self.holdout)?,
+            rig: maybe("rig.toml", &self.rig_toml)?,
+            model: maybe("model.toml", &self.model_toml)?,
+        })
+    }
+}
+
+/// Where a case was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CasePaths {
+    /// Training logs.
+    pub train: Vec<PathBuf>,
+    /// Log held out.
+    pub holdout: PathBuf,
+    /// Rig file.
+    pub rig: Option<PathBuf>,
+    /// Baseline model file.
+    pub model: Option<PathBuf>,
 }

@@ -64,7 +64,7 @@ fn each_effect_changes_the_signals_of_its_subsystem_well_beyond_noise() {
             _ => Base::BySeed,
         };
         let of = |effects: &[Effect]| {
-            generate(&Scenario { base, duration_s: 12.0, ..Scenario::new(effects, seed) }).unwrap()
+            generate(&Scenario { base, duration_s: 8.0, ..Scenario::new(effects, seed) }).unwrap()
         };
         let (with, without) = (of(&[*effect]), of(&[]));
         let noise = with.truth.noise;
@@ -97,7 +97,8 @@ fn each_drive_effect_changes_the_torque_of_a_drive_log_well_beyond_noise() {
     for form in [Form::Drive, Form::LinearStage] {
         for (i, effect) in Effect::ALL.iter().filter(|e| e.works_without_contact()).enumerate() {
             let of = |effects: &[Effect]| {
-                generate(&Scenario { form, ..Scenario::new(effects, 200 + i as u64) }).unwrap()
+                generate(&Scenario { form, duration_s: 12.0, ..Scenario::new(effects, 200 + i as u64) })
+                    .unwrap()
             };
             let (with, without) = (of(&[*effect]), of(&[]));
             let (name, unit) = if form == Form::Drive { ("m2_torque_nm", 1.0) } else { ("force_n", 80.0) };
@@ -182,7 +183,7 @@ fn drive_logs_hold_the_columns_of_a_drive() {
 #[test]
 fn every_effect_keeps_the_rig_within_its_limits() {
     for (i, effect) in Effect::ALL.iter().enumerate() {
-        let scenario = Scenario { duration_s: 8.0, ..Scenario::new(&[*effect], 300 + i as u64) };
+        let scenario = Scenario { duration_s: 6.0, ..Scenario::new(&[*effect], 300 + i as u64) };
         let case = generate(&scenario).unwrap();
         for log in logs(&case) {
             let greatest = |name: &str| log.column(name).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -201,7 +202,7 @@ fn every_effect_keeps_the_rig_within_its_limits() {
 
 #[test]
 fn every_course_excites_every_effect() {
-    for seed in 0..8 {
+    for seed in 0..4 {
         let case = generate(&Scenario { noise_factor: 0.0, ..Scenario::new(&[], seed) }).unwrap();
         for log in logs(&case) {
             let speed = log.column("m2_speed_rad_s");
@@ -233,8 +234,8 @@ fn every_course_excites_every_effect() {
 
 #[test]
 fn without_an_effect_the_true_numbers_explain_the_log_to_the_noise() {
-    for seed in 0..10 {
-        let case = generate(&Scenario::new(&[], seed)).unwrap();
+    for seed in 0..6 {
+        let case = generate(&Scenario { duration_s: 10.0, ..Scenario::new(&[], seed) }).unwrap();
         // What is left is the lag of the normal bridge, which no model driven by the log can undo.
         assert!(case.truth.residual_to_noise.iter().all(|ratio| *ratio < 1.5), "seed {seed}");
     }

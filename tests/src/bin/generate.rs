@@ -110,21 +110,9 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     };
     let case = generate(&scenario).map_err(|error| error.to_string())?;
     let truth = case.truth.to_json().map_err(|error| error.to_string())?;
-    std::fs::create_dir_all(&arguments.out).map_err(|e| format!("{}: {e}", arguments.out.display()))?;
-    let write = |name: &str, text: &str| {
-        let path = arguments.out.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-    };
-    for (i, text) in case.train.iter().enumerate() {
-        write(&format!("train{}.csv", i + 1), text)?;
-    }
-    write("holdout.csv", &case.holdout)?;
-    for (name, text) in [("rig.toml", &case.rig_toml), ("model.toml", &case.model_toml)] {
-        if !text.is_empty() {
-            write(name, text)?;
-        }
-    }
-    write("truth.json", &truth)?;
+    let failed = |error: std::io::Error| format!("{}: {error}", arguments.out.display());
+    case.write(&arguments.out).map_err(failed)?;
+    std::fs::write(arguments.out.join("truth.json"), truth).map_err(failed)?;
     let [friction, normal, drive] = case.truth.residual_to_noise;
     println!("residual over noise: friction {friction:.1}, normal force {normal:.1}, drive {drive:.1}");
     Ok(())
