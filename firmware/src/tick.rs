@@ -19,7 +19,8 @@ use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use heapless::spsc::{Consumer, Producer, Queue};
 use model_core::control::{
-    Command, ControlConfig, ControlState, Event, Fault, Leds, Outputs, Refused, Samples, apply, step,
+    Command, ControlConfig, ControlState, Event, Fault, Leds, Outputs, Refused, Samples, SequencerState,
+    apply, step,
 };
 use rig_link::capture::CaptureTrigger;
 use rig_link::telemetry::{Health, TelemetryRow};
@@ -251,7 +252,9 @@ impl Tick {
         NOW[1].store((record.tick >> 32) as u32, Relaxed);
         MODE.store(u32::from(record.mode.number()), Relaxed);
         if self.every_ticks != 0 {
-            self.until_row -= 1;
+            // The first tick of an experiment has a row, so that rows of two runs lie at the same times.
+            let first = record.sequencer == SequencerState::Running && record.experiment_tick == 1;
+            self.until_row = if first { 0 } else { self.until_row - 1 };
             if self.until_row == 0 {
                 self.until_row = self.every_ticks;
                 let row = TelemetryRow::new(record, self.sequence, self.cycles);

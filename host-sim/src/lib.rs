@@ -6,6 +6,7 @@ pub mod diagnose;
 pub mod files;
 pub mod fit;
 pub mod input_error;
+pub mod link;
 pub mod lockstep;
 pub mod plant;
 pub mod predict;

@@ -4,7 +4,12 @@
 //! and one line in [`Command`] here.
 
 pub mod common;
+mod monitor;
+mod port;
 mod predict;
+mod record;
+mod run;
+mod settings;
 mod simulate;
 
 pub mod progress;
@@ -55,6 +60,10 @@ macro_rules! commands {
 commands! {
     Predict(predict::Predict),
     Simulate(simulate::Simulate),
+    Record(record::RecordArgs),
+    Run(run::Run),
+    Monitor(monitor::Monitor),
+    Settings(settings::Settings),
 }
 
 /// Runs the tool with the arguments of the process.

@@ -27,6 +27,7 @@ impl From<control::Event> for EventMessage {
                 EventKind::ProgramLoaded { duration_ticks }
             }
             control::EventKind::ConfigChanged => EventKind::ConfigChanged,
+            control::EventKind::ModelChanged => EventKind::ModelChanged,
             control::EventKind::TareDone { friction_zero_code, normal_zero_code } => {
                 EventKind::Tared { friction_zero_code, normal_zero_code }
             }

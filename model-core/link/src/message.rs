@@ -32,6 +32,8 @@ pub struct Request {
 }
 
 /// What the host can ask for.
+// The firmware has one of these at a time, and no allocator to box a model with.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Command {
     /// Who is there.
@@ -203,7 +205,7 @@ pub enum Rejection {
 }
 
 /// Who is here.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hello {
     /// [`PROTOCOL_VERSION`] of the firmware.
     pub protocol: u16,
@@ -226,7 +228,7 @@ pub struct Hello {
 }
 
 /// Why the chip started.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
     /// Power came on or fell below the brown-out level.
@@ -238,6 +240,7 @@ pub enum ResetCause {
     /// The watchdog.
     Watchdog,
     /// Another cause.
+    #[default]
     Other,
 }
 
@@ -305,6 +308,8 @@ pub enum EventKind {
     },
     /// New settings are in force.
     ConfigChanged,
+    /// The observer runs another model.
+    ModelChanged,
     /// New zeros of the bridges.
     Tared {
         /// Zero of the friction bridge, code.

@@ -45,7 +45,7 @@ pub struct TelemetryRow {
     pub limits: u16,
     /// State of the sequencer.
     pub sequencer: u8,
-    /// Ticks since the start of the experiment.
+    /// Ticks of the experiment so far, this one included: 1 in its first.
     pub experiment_tick: u32,
     /// Processor cycles from entry to exit of the last tick.
     pub cycles: u32,

@@ -1,0 +1,102 @@
+//! `rig record`: what the rig does, without commanding it.
+
+use std::path::PathBuf;
+
+use rig_link::capture::CaptureTrigger;
+
+use super::common::say;
+use super::port::{PortArgs, every_ticks, sign};
+use crate::files::output_dir::OutputDir;
+use crate::input_error::InputError;
+use crate::link::capture::ReadCapture;
+use crate::link::record::Record;
+use crate::link::rows::{self, Zero};
+
+/// Record what the rig does, without commanding it
+#[derive(clap::Args, Debug)]
+#[command(after_long_help = "\
+Example:
+  rig record --port /dev/ttyACM0 --seconds 10 --out runs/by-hand
+  rig record --port /dev/ttyACM0 --capture fault --out runs/last-fault
+
+Writes log.csv. Without --capture: telemetry for so many seconds. With --capture: every tick of the 10 kHz
+loop for 1.024 s before and after the trigger, from the firmware's memory; time 0 is the trigger.
+Triggers: start (of an experiment), fault, now, friction=CODE or normal=CODE (the bridge's 16 bit code rises
+above it), armed (do not arm, read the capture that is armed already).")]
+pub(super) struct RecordArgs {
+    #[command(flatten)]
+    port: PortArgs,
+    /// How long
+    #[arg(long, value_name = "S", default_value_t = 10.0, conflicts_with = "capture")]
+    seconds: f64,
+    /// Rows per second
+    #[arg(long, value_name = "HZ", default_value_t = 1000, conflicts_with = "capture")]
+    rate_hz: u32,
+    /// Capture every tick around a trigger: start, fault, now, friction=CODE, normal=CODE, armed
+    #[arg(long, value_name = "TRIGGER")]
+    capture: Option<String>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+enum Wanted {
+    Armed,
+    Now,
+    At(CaptureTrigger),
+}
+
+fn trigger(text: &str) -> Result<Wanted, InputError> {
+    let refuse = || {
+        InputError::new("is no trigger")
+            .file("--capture")
+            .value(text)
+            .allowed("start, fault, now, friction=CODE, normal=CODE (0 … 65535), armed")
+    };
+    let code = |code: &str| code.parse::<u16>().map_err(|_| refuse());
+    Ok(match text.split_once('=') {
+        None if text == "start" => Wanted::At(CaptureTrigger::Start),
+        None if text == "fault" => Wanted::At(CaptureTrigger::Fault),
+        None if text == "now" => Wanted::Now,
+        None if text == "armed" => Wanted::Armed,
+        Some(("friction", above)) => Wanted::At(CaptureTrigger::FrictionAbove { code: code(above)? }),
+        Some(("normal", above)) => Wanted::At(CaptureTrigger::NormalAbove { code: code(above)? }),
+        _ => return Err(refuse()),
+    })
+}
+
+impl RecordArgs {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), InputError> {
+        if !(self.seconds > 0.0 && self.seconds <= 3600.0) {
+            let error = InputError::new("out of range").file("--seconds").value(self.seconds);
+            return Err(error.allowed("more than 0, up to 3600"));
+        }
+        let every_ticks = every_ticks(self.rate_hz)?;
+        let wanted = self.capture.as_deref().map(trigger).transpose()?;
+        let mut output = OutputDir::new(&self.out)?;
+        let mut port = self.port.open()?;
+        let (mut log, hello, missing) = match wanted {
+            None => {
+                let recorded = port.perform(&mut Record::new(every_ticks, self.seconds, true))?;
+                let log = rows::log(&recorded.rows, &recorded.scale, Zero::FirstRow);
+                (log, recorded.hello, rows::missing(&recorded.rows))
+            }
+            Some(wanted) => {
+                let mut procedure = match wanted {
+                    Wanted::Armed => ReadCapture::new(None),
+                    Wanted::Now => ReadCapture::now(),
+                    Wanted::At(trigger) => ReadCapture::new(Some(trigger)),
+                };
+                let captured = port.perform(&mut procedure)?;
+                (captured.log(), captured.hello, 0)
+            }
+        };
+        sign(&mut log, &hello, missing);
+        output.write_log(&log)?;
+        let folder = output.folder().to_path_buf();
+        output.finish()?;
+        say(&format!("{} rows written to {}", log.len(), folder.display()));
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+//! Something that is done over a link, step by step, and the loop that does it on a transport.
+//!
+//! A procedure is given the time and a [`Client`] with what came in; it queues requests and says when it
+//! is done. On a serial port [`perform`] calls it; the virtual bench calls it once a control period, with
+//! the emulated chip's time.
+
+use std::time::{Duration, Instant};
+
+use super::client::Client;
+use crate::input_error::InputError;
+
+/// Something done over a link.
+pub trait Procedure {
+    /// What comes of it.
+    type Outcome;
+
+    /// Looks at what came in, queues what is to go out. `now_s` only rises.
+    ///
+    /// # Errors
+    /// Why it cannot go on.
+    fn step(&mut self, now_s: f64, client: &mut Client) -> Result<(), InputError>;
+
+    /// What came of it, once; `None` while it is not done.
+    fn outcome(&mut self) -> Option<Self::Outcome>;
+
+    /// What a person should read now.
+    fn notes(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Bytes to and from a rig.
+pub trait Transport {
+    /// Its name for messages.
+    fn name(&self) -> String;
+
+    /// Appends what has come in to `bytes`; waits a little if there is nothing.
+    ///
+    /// # Errors
+    /// The transport is gone.
+    fn receive(&mut self, bytes: &mut Vec<u8>) -> std::io::Result<()>;
+
+    /// Sends all bytes.
+    ///
+    /// # Errors
+    /// The transport is gone.
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
+}
+
+/// Does a procedure on a transport, to its end; `tell` gets its notes.
+///
+/// # Errors
+/// The transport failed, or the procedure cannot go on.
+pub fn perform<P: Procedure>(
+    transport: &mut dyn Transport,
+    client: &mut Client,
+    procedure: &mut P,
+    mut tell: impl FnMut(&str),
+) -> Result<P::Outcome, InputError> {
+    let begun = Instant::now();
+    let failed = |transport: &dyn Transport, doing: &str, error: &std::io::Error| {
+        InputError::new(format!("cannot {doing}: {error}")).file(transport.name())
+    };
+    let mut bytes = Vec::new();
+    loop {
+        procedure
+            .step(begun.elapsed().as_secs_f64(), client)
+            .map_err(|error| error.file(transport.name()))?;
+        procedure.notes().iter().for_each(|note| tell(note));
+        let outgoing = client.take_outgoing();
+        if !outgoing.is_empty() {
+            transport.send(&outgoing).map_err(|error| failed(transport, "write", &error))?;
+        }
+        if let Some(outcome) = procedure.outcome() {
+            return Ok(outcome);
+        }
+        bytes.clear();
+        transport.receive(&mut bytes).map_err(|error| failed(transport, "read", &error))?;
+        client.receive(&bytes);
+    }
+}
+
+/// Keeps the rig from thinking that the host is gone.
+#[derive(Debug, Default)]
+pub(super) struct KeepAlive {
+    requests: u64,
+    since_s: f64,
+}
+
+impl KeepAlive {
+    /// The rig waits 0.5 s by default; a fifth of that leaves room for lost frames.
+    const EVERY_S: f64 = 0.1;
+
+    /// Sends a sign of life where no other request went out for a while.
+    pub(super) fn step(&mut self, now_s: f64, client: &mut Client) {
+        if client.requests() != self.requests {
+            self.since_s = now_s;
+        } else if now_s - self.since_s >= Self::EVERY_S {
+            client.request(rig_link::message::Command::KeepAlive);
+            self.since_s = now_s;
+        }
+        self.requests = client.requests();
+    }
+}
+
+/// How long to wait for an answer.
+pub(super) fn patience(command: &rig_link::message::Command) -> Duration {
+    use rig_link::message::Command;
+    match command {
+        // May erase a sector of flash: up to 4 s by the data sheet, twice for the store's own move.
+        Command::SettingSet { .. }
+        | Command::SettingForget { .. }
+        | Command::SettingsErase
+        | Command::ModelSet(_)
+        | Command::ModelForget => Duration::from_secs(12),
+        Command::SelfCheck { .. } => Duration::from_secs(5),
+        _ => Duration::from_secs(1),
+    }
+}

@@ -1,0 +1,161 @@
+//! Records what the rig does without commanding it: telemetry for a time, or until it is enough.
+
+use rig_link::message::{Answer, Command, EventMessage, Hello, KeptMessage, Message};
+use rig_link::telemetry::{Health, TelemetryRow};
+
+use super::ask::{Ask, check_hello};
+use super::client::Client;
+use super::procedure::Procedure;
+use super::rows::Scale;
+use super::words;
+use crate::input_error::InputError;
+
+const M1_COUNTS_KEY: u16 = 160;
+const M2_COUNTS_KEY: u16 = 170;
+
+/// What was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// Who sent it.
+    pub hello: Hello,
+    /// How its counts and ticks are to be read.
+    pub scale: Scale,
+    /// What the firmware kept from before its last restart.
+    pub kept: Option<KeptMessage>,
+    /// The rows.
+    pub rows: Vec<TelemetryRow>,
+    /// What happened meanwhile.
+    pub events: Vec<EventMessage>,
+    /// The last health record.
+    pub health: Option<Health>,
+}
+
+/// The procedure.
+#[derive(Debug)]
+pub struct Record {
+    every_ticks: u16,
+    ticks: u64,
+    keep_rows: bool,
+    ask: Ask,
+    recorded: Option<Recorded>,
+    /// Telemetry was switched off again.
+    ending: bool,
+    done: bool,
+    heard_s: f64,
+    notes: Vec<String>,
+}
+
+impl Record {
+    /// Records a row every `every_ticks` ticks, for `duration_s`; without rows to keep it only watches.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn new(every_ticks: u16, duration_s: f64, keep_rows: bool) -> Self {
+        let commands = [
+            Command::Hello,
+            Command::SettingGet { key: M1_COUNTS_KEY },
+            Command::SettingGet { key: M2_COUNTS_KEY },
+            Command::KeptMessage,
+            Command::Telemetry { every_ticks },
+        ];
+        Self {
+            every_ticks,
+            ticks: (duration_s * 1e4) as u64,
+            keep_rows,
+            ask: Ask::new(commands),
+            recorded: None,
+            ending: false,
+            done: false,
+            heard_s: 0.0,
+            notes: Vec::new(),
+        }
+    }
+
+    /// What is there so far.
+    #[must_use]
+    pub fn recorded(&self) -> Option<&Recorded> {
+        self.recorded.as_ref()
+    }
+
+    fn begin(&mut self, answers: &[Answer]) -> Result<(), InputError> {
+        let [hello, m1_counts, m2_counts, kept, telemetry] = answers else {
+            return Err(InputError::new("the rig did not answer the greeting"));
+        };
+        let hello = check_hello(hello)?;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a whole number by its setting
+        let counts = |answer: &Answer| match answer {
+            Answer::Setting(state) => Ok(state.active as u32),
+            other => Err(words::unexpected(other)),
+        };
+        let kept = match kept {
+            Answer::Kept(kept) => kept.clone(),
+            other => return Err(words::unexpected(other)),
+        };
+        words::accepted(telemetry)?;
+        self.notes.push(words::hello(&hello));
+        self.notes.extend(kept.iter().map(|kept| words::kept(kept, hello.tick_hz)));
+        let scale = Scale {
+            tick_hz: hello.tick_hz,
+            m1_counts_per_rev: counts(m1_counts)?,
+            m2_counts_per_rev: counts(m2_counts)?,
+        };
+        let (rows, events, health) = (Vec::new(), Vec::new(), None);
+        self.recorded = Some(Recorded { hello, scale, kept, rows, events, health });
+        Ok(())
+    }
+
+    fn take(&mut self, message: Message, now_s: f64) {
+        let Some(recorded) = &mut self.recorded else { return };
+        match message {
+            Message::Telemetry(row) => {
+                self.heard_s = now_s;
+                if !self.keep_rows {
+                    recorded.rows.clear();
+                }
+                recorded.rows.push(row);
+                let enough = u64::from(row.sequence) * u64::from(self.every_ticks) >= self.ticks;
+                if enough && !self.ending {
+                    self.ending = true;
+                    self.ask.push(Command::Telemetry { every_ticks: 0 });
+                }
+            }
+            Message::Health(health) => recorded.health = Some(health),
+            Message::Event(event) => {
+                self.notes.push(words::event(&event, recorded.scale.tick_hz));
+                recorded.events.push(event);
+            }
+            Message::Answer { .. } => {}
+        }
+    }
+}
+
+impl Procedure for Record {
+    type Outcome = Recorded;
+
+    fn step(&mut self, now_s: f64, client: &mut Client) -> Result<(), InputError> {
+        self.ask.step(now_s, client)?;
+        if self.ask.is_idle() {
+            let answers = self.ask.take_answers();
+            if !answers.is_empty() && self.recorded.is_none() {
+                self.heard_s = now_s;
+                self.begin(&answers)?;
+            } else if !answers.is_empty() {
+                self.done = true;
+            }
+        }
+        for message in self.ask.take_others() {
+            self.take(message, now_s);
+        }
+        if self.recorded.is_some() && !self.ending && now_s - self.heard_s > 2.0 {
+            return Err(InputError::new("the rig has gone silent"));
+        }
+        Ok(())
+    }
+
+    fn outcome(&mut self) -> Option<Recorded> {
+        if self.done { self.recorded.take() } else { None }
+    }
+
+    fn notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+}

@@ -1,0 +1,170 @@
+//! What the rig says, in words. Numbers this tool does not know are shown as numbers.
+
+use model_core::control::{Fault, Limit, Mode, Reason, Refusal};
+use rig_link::message::{
+    Answer, Command, EventKind, EventMessage, Hello, KeptKind, KeptMessage, Rejection, ResetCause,
+};
+use rig_link::settings;
+
+use crate::input_error::InputError;
+
+fn or_number(sentence: Option<&str>, what: &str, number: u8) -> String {
+    sentence.map_or_else(|| format!("{what} {number}"), str::to_owned)
+}
+
+/// A fault by its number.
+#[must_use]
+pub fn fault(number: u8) -> String {
+    format!("fault {number}: {}", or_number(Fault::from_number(number).map(Fault::sentence), "fault", number))
+}
+
+/// A mode by its number.
+#[must_use]
+pub fn mode(number: u8) -> String {
+    Mode::from_number(number)
+        .map_or_else(|| format!("mode {number}"), |mode| format!("{mode:?}").to_lowercase())
+}
+
+/// An event, with its time since the start of the firmware.
+#[must_use]
+pub fn event(event: &EventMessage, tick_hz: u32) -> String {
+    #[allow(clippy::cast_precision_loss)]
+    let time_s = event.tick as f64 / f64::from(tick_hz.max(1));
+    let what = match event.kind {
+        EventKind::Mode { from, to, reason } => {
+            let reason = or_number(Reason::from_number(reason).map(Reason::sentence), "reason", reason);
+            format!("{} -> {}: {reason}", mode(from), mode(to))
+        }
+        EventKind::FaultLatched(number) => fault(number),
+        EventKind::FaultCleared(number) => format!("cleared {}", fault(number)),
+        EventKind::Limit(number) => {
+            format!("limit: {}", or_number(Limit::from_number(number).map(Limit::sentence), "limit", number))
+        }
+        EventKind::Refused { reason, fault } => refused(reason, fault),
+        EventKind::ProgramLoaded { duration_ticks } => format!("experiment of {duration_ticks} ticks loaded"),
+        EventKind::ConfigChanged => "new settings in force".into(),
+        EventKind::ModelChanged => "new model in the observer".into(),
+        EventKind::Tared { friction_zero_code, normal_zero_code } => {
+            format!("tared: friction bridge {friction_zero_code}, normal force bridge {normal_zero_code}")
+        }
+        EventKind::TareRefused { friction_nm, normal_n } => {
+            format!("not tared: too far from zero, {friction_nm} N m and {normal_n} N")
+        }
+        EventKind::Other => "an event this tool has no words for".into(),
+    };
+    format!("{time_s:.4} s  {what}")
+}
+
+fn refused(reason: u8, in_the_way: Option<u8>) -> String {
+    let reason = or_number(Refusal::from_number(reason).map(Refusal::sentence), "refusal", reason);
+    let behind = in_the_way.map_or(String::new(), |number| format!(" ({})", fault(number)));
+    format!("refused: {reason}{behind}")
+}
+
+/// Who answered.
+#[must_use]
+pub fn hello(hello: &Hello) -> String {
+    let build: String = hello.build_id.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
+    let reset = match hello.reset {
+        ResetCause::PowerOn => "power-on",
+        ResetCause::Pin => "the reset pin",
+        ResetCause::Software => "its own request",
+        ResetCause::Watchdog => "the watchdog",
+        ResetCause::Other => "an unknown reset",
+    };
+    let clock = if hello.crystal { "" } else { "; without its crystal: times and speeds may be off by 1 %" };
+    format!("firmware {} build {build}, started by {reset}{clock}", hello.version)
+}
+
+/// What the firmware kept from before its last restart.
+#[must_use]
+pub fn kept(message: &KeptMessage, tick_hz: u32) -> String {
+    let kind = match message.kind {
+        KeptKind::Panic => "stopped itself",
+        KeptKind::HardFault => "trapped",
+        KeptKind::Exception => "met an interrupt nobody handles",
+    };
+    #[allow(clippy::cast_precision_loss)]
+    let time_s = message.tick as f64 / f64::from(tick_hz.max(1));
+    format!("before its last restart the firmware {kind} after {time_s:.4} s: {}", message.text)
+}
+
+/// A request, for messages about it.
+#[must_use]
+pub fn command(command: &Command) -> &'static str {
+    match command {
+        Command::Hello => "the greeting",
+        Command::KeepAlive => "a sign of life",
+        Command::Arm => "arm",
+        Command::Disarm => "disarm",
+        Command::Start => "start",
+        Command::Stop => "stop",
+        Command::ClearFault => "clear fault",
+        Command::Tare => "tare",
+        Command::ProgramBegin(_) | Command::ProgramSegment(_) | Command::ProgramCommit => {
+            "the upload of the experiment"
+        }
+        Command::SettingGet { .. } => "the question for a setting",
+        Command::SettingSet { .. } => "the change of a setting",
+        Command::SettingForget { .. } => "forgetting a setting",
+        Command::SettingsErase => "erasing the settings",
+        Command::ModelGet => "the question for the model",
+        Command::ModelSet(_) => "the upload of the model",
+        Command::ModelForget => "forgetting the model",
+        Command::Telemetry { .. } => "the rate of telemetry",
+        Command::CaptureArm(_) => "arming the capture",
+        Command::CaptureTrigger => "triggering the capture",
+        Command::CaptureStatus => "the question for the capture",
+        Command::CaptureRead { .. } => "reading the capture",
+        Command::KeptMessage => "the question for the kept message",
+        Command::SelfCheck { .. } => "the self-check",
+        Command::Restart => "restart",
+    }
+}
+
+/// The error an answer stands for, if it is one.
+///
+/// # Errors
+/// What the rig refused, in words.
+pub fn accepted(answer: &Answer) -> Result<(), InputError> {
+    match answer {
+        Answer::Refused { reason, fault } => Err(InputError::new(refused(*reason, *fault))),
+        Answer::Rejected(rejection) => Err(rejected(rejection)),
+        _ => Ok(()),
+    }
+}
+
+fn rejected(rejection: &Rejection) -> InputError {
+    let plain = |text: &str| InputError::new(text);
+    match rejection {
+        Rejection::UnknownSetting => plain("the firmware does not know this setting"),
+        Rejection::OutOfRange { name, value, allowed } => {
+            InputError::new("refused by the rig").key(name.as_str()).value(value).allowed(allowed.as_str())
+        }
+        Rejection::IncompleteProgram => plain("the experiment did not arrive whole"),
+        Rejection::ImpossibleProgram { why } => plain(&format!("the rig cannot run this experiment: {why}")),
+        Rejection::NotDisabled => plain("possible only while the rig is disabled"),
+        Rejection::Storage => {
+            plain("the rig could not store it; if its settings are damaged, erase them first")
+        }
+        Rejection::NoCapture => plain("there is no complete capture"),
+        Rejection::UnknownCase => plain("the firmware has no such self-check"),
+        Rejection::NoTick => plain("the rig's control tick did not answer"),
+    }
+}
+
+/// An answer of the wrong kind.
+#[must_use]
+pub fn unexpected(answer: &Answer) -> InputError {
+    accepted(answer).err().unwrap_or_else(|| InputError::new("the rig gave an answer of another kind"))
+}
+
+/// A setting with its name, values and unit, as a line of a list.
+#[must_use]
+pub fn setting(state: &settings::SettingState) -> String {
+    let info = settings::by_key(state.key);
+    let name = info.map_or_else(|| format!("setting {}", state.key), |info| info.name.to_owned());
+    let unit = info.map_or("", |info| info.unit);
+    let stored = state.stored.map_or_else(|| "-".to_owned(), |value| value.to_string());
+    format!("{name:40} {:>14} {stored:>14} {:>14}  {unit}", state.active, state.default)
+}
