@@ -1,0 +1,90 @@
+//! `cargo verify`: host suite, lints, dependency policy, the firmware for the chip with its size, and
+//! the same ELF on the virtual bench.
+//!
+//! Every command is printed before it runs, so that it can be repeated alone. All steps run even where
+//! one fails; the table at the end says how each ended. What this machine lacks is fetched where that
+//! is possible, and named with the command that would get it where it is not.
+
+mod size;
+mod step;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use step::{Ended, Runner};
+
+/// The firmware's target.
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The package that needs a newer declared Rust than the workspace's, and builds on it all the same.
+const BENCH: [&str; 3] = ["--package", "virtual-bench", "--ignore-rust-version"];
+
+fn main() -> ExitCode {
+    let root = root();
+    let mut run = Runner::new(&root);
+    host(&mut run);
+    policy(&mut run);
+    firmware(&mut run, &root);
+    bench(&mut run);
+    run.summary()
+}
+
+/// The workspace: this package lies in tests/verify.
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.ancestors().nth(2).unwrap_or(here).to_path_buf()
+}
+
+fn host(run: &mut Runner) {
+    run.cargo("format", ".", &["fmt", "--all", "--check"]);
+    run.cargo("lints", ".", &["clippy", "--quiet", "--all-targets", "--", "-D", "warnings"]);
+    run.cargo_env("docs", ".", &["doc", "--quiet", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")]);
+    run.cargo("host suite", ".", &["test", "--no-fail-fast"]);
+}
+
+fn policy(run: &mut Runner) {
+    let name = "dependencies";
+    if !run.has(&["deny", "--version"]) {
+        run.cargo("cargo-deny", ".", &["install", "--quiet", "--locked", "cargo-deny"]);
+    }
+    if !run.has(&["deny", "--version"]) {
+        run.note(
+            name,
+            Ended::Lacking("cargo-deny could not be had: cargo install --locked cargo-deny".into()),
+        );
+        return;
+    }
+    run.cargo(name, ".", &["deny", "--workspace", "check", "bans", "licenses", "sources"]);
+    let manifest = ["deny", "--manifest-path", "firmware/Cargo.toml", "check"];
+    run.cargo("firmware's dependencies", ".", &[&manifest[..], &["bans", "licenses", "sources"]].concat());
+    // The list of advisories is fetched from the network at each run; without it nothing can be said.
+    if run.quietly(&["deny", "--workspace", "fetch", "db"]) {
+        run.cargo("advisories", ".", &["deny", "--workspace", "check", "advisories"]);
+    } else {
+        let how = "the advisory list could not be fetched: cargo deny fetch db, with a network";
+        run.note("advisories", Ended::Skipped(how.into()));
+    }
+}
+
+fn firmware(run: &mut Runner, root: &Path) {
+    if !run.target(TARGET) {
+        let how = format!("the target could not be had: rustup target add {TARGET}");
+        run.note("firmware", Ended::Lacking(how));
+        return;
+    }
+    run.cargo("firmware format", "firmware", &["fmt", "--check"]);
+    run.cargo("firmware lints", "firmware", &["clippy", "--quiet", "--release", "--", "-D", "warnings"]);
+    let warnings = [("RUSTFLAGS", "-D warnings")];
+    run.cargo_env("firmware", "firmware", &["build", "--quiet", "--release"], &warnings);
+    let elf = root.join("firmware/target").join(TARGET).join("release/rig-firmware");
+    match size::of(&elf) {
+        Ok(size) => run.note("firmware size", Ended::Passed(size.to_string())),
+        Err(error) => run.note("firmware size", Ended::Failed(error)),
+    }
+}
+
+fn bench(run: &mut Runner) {
+    let lints = [&["clippy", "--quiet", "--release", "--all-targets"][..], &BENCH, &["--", "-D", "warnings"]];
+    run.cargo("bench lints", ".", &lints.concat());
+    run.cargo("bench suite", ".", &[&["test", "--release"][..], &BENCH].concat());
+}
