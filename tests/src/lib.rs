@@ -1,7 +1,12 @@
 //! Generators of logs with a hidden effect; they share no code with the product.
 //!
 //! [`generate::generate`] turns a [`scenario::Scenario`] into logs, rig file and baseline model file as
-//! a user would have them, and the truth behind them. Same scenario, same bytes.
+//! a user would have them, and the truth behind them. Same scenario, same bytes. By hand:
+//! `cargo run -p rig-tests --bin generate -- --effect thermal_fade --seed 7 --out DIR`.
+//!
+//! How a contact log comes about: [`course`] → [`contact_log`] ([`pressure`], [`curve`] and
+//! [`contact_force`], [`drive`], each with the effects of [`laws`]) → [`sensors`] → [`files`].
+//! [`shadow`] measures how large the effect is; [`reference_rig`] is a solver's view of the rig without effects.
 
 pub mod contact_force;
 pub mod contact_log;
