@@ -54,6 +54,33 @@ pub fn start(adc: Peri<'static, peripherals::ADC1>) {
     arm();
 }
 
+/// Converts one channel once by software: for the loop-back test, instead of the scan.
+#[must_use]
+pub fn convert_once(channel: u8) -> u16 {
+    let index = usize::from(channel);
+    ADC1.sqr1().write(|w| {
+        w.set_l(0);
+        w.set_sq(0, channel);
+    });
+    ADC1.pcsel().modify(|w| w.set_pcsel(index, Pcsel::PRESELECTED));
+    let (register, place) = if channel < 10 { (0, index) } else { (1, index - 10) };
+    // The DAC's buffer drives the sampling capacitor more slowly than the rig's amplifiers do.
+    ADC1.smpr(register).modify(|w| w.set_smp(place, SampleTime::CYCLES387_5));
+    ADC1.cfgr().modify(|w| {
+        w.set_res(Res::BITS16);
+        w.set_dmngt(Dmngt::DR);
+        w.set_exten(Exten::DISABLED);
+    });
+    ADC1.isr().write(|w| {
+        w.set_eoc(true);
+        w.set_eos(true);
+        w.set_ovr(true);
+    });
+    ADC1.cr().modify(|w| w.set_adstart(true));
+    while !ADC1.isr().read().eoc() {}
+    ADC1.dr().read().0 as u16
+}
+
 /// Starts the control period.
 pub fn start_timer() {
     rcc::enable_and_reset::<peripherals::TIM6>();

@@ -70,6 +70,12 @@ pub fn config(crystal: bool) -> Config {
     config
 }
 
+/// Whether the core runs from the crystal.
+#[must_use]
+pub fn crystal_is_used() -> bool {
+    pac::RCC.pllckselr().read().pllsrc() == PllSource::HSE
+}
+
 /// Turns the clock security system on: a crystal that fails traps (NMI) instead of slowing the loop.
 pub fn watch_crystal() {
     pac::RCC.cr().modify(|w| w.set_hsecsson(true));

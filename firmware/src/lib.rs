@@ -18,6 +18,7 @@ pub mod log;
 pub mod memory;
 pub mod outputs;
 pub mod restart;
+pub mod self_test;
 pub mod settings;
 pub mod tick;
 pub mod watchdog;

@@ -11,11 +11,14 @@
 //! | info | changes of mode, commands that took effect |
 
 use crate::link::OUTGOING;
-use crate::watchdog;
+use crate::{board, tick, watchdog};
 use embassy_time::{Duration, Ticker};
 use heapless::spsc::Consumer;
 use model_core::control::{Event, EventKind};
 use rig_link::message::Message;
+
+// Lines carry the time of the control tick in which they were written, so that they compare with telemetry.
+defmt::timestamp!("{=u64:us}", tick::now() * (1_000_000 / board::TICK_HZ as u64));
 
 /// Time between two looks at the queue; also the threads' sign of life for the watchdog.
 const LOOK: Duration = Duration::from_millis(5);

@@ -33,6 +33,14 @@ pub fn write_enables(enable: [bool; 2]) {
     M1_ENABLE.port.bsrr().write(|w| w.0 = change);
 }
 
+/// What the outputs show: DAC codes and enables.
+#[must_use]
+pub fn shown() -> ([u16; 2], [bool; 2]) {
+    let codes = [DAC1.dor(0).read().dor(), DAC1.dor(1).read().dor()];
+    let enabled = M1_ENABLE.port.odr().read().0;
+    (codes, [M1_ENABLE.pin, M2_ENABLE.pin].map(|pin| enabled >> pin & 1 != 0))
+}
+
 /// Drives off, zero torque; from any context, any number of times. The caller has stopped the control
 /// tick (interrupts masked) if this is to last.
 pub fn make_safe() {

@@ -12,6 +12,7 @@ use crate::capture::Recorder;
 use crate::watchdog::Feeder;
 use crate::{adc_scan, board, encoders, inputs, outputs};
 use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering::{Relaxed, Release};
 use core::sync::atomic::{AtomicBool, AtomicU32};
 use cortex_m::peripheral::DWT;
@@ -85,13 +86,13 @@ struct Tick {
     start_max: u16,
 }
 
-struct TickCell(UnsafeCell<Option<Tick>>);
+struct TickCell(UnsafeCell<MaybeUninit<Tick>>);
 
 // SAFETY: `start` fills the cell before it enables the two interrupts. After that only they use it, and as
 // they have the same priority neither interrupts the other.
 unsafe impl Sync for TickCell {}
 
-static TICK: TickCell = TickCell(UnsafeCell::new(None));
+static TICK: TickCell = TickCell(UnsafeCell::new(MaybeUninit::uninit()));
 static NOW: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
 static LINK_HEARD: AtomicBool = AtomicBool::new(false);
 static MODE: AtomicU32 = AtomicU32::new(0);
@@ -150,7 +151,7 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
     };
     // SAFETY: the interrupts that use the cell are not enabled yet, and the `StaticCell`s above let this
     // function pass once only.
-    unsafe { *TICK.0.get() = Some(tick) };
+    unsafe { (*TICK.0.get()).write(tick) };
     for line in [interrupt::DMA1_STREAM7, interrupt::TIM6_DAC] {
         line.unpend();
         line.set_priority(Priority::P1);
@@ -161,24 +162,32 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
     Ends { orders: order_end, answers: answer_end, rows: row_end, health: health_end, events: event_end }
 }
 
+/// The tick's state, for the two interrupts.
+///
+/// # Safety
+/// To be called from the handlers of the two interrupts that [`start`] enables, and nowhere else.
+#[inline(always)]
+unsafe fn the_tick() -> &'static mut Tick {
+    // SAFETY: `start` wrote the value before it enabled the interrupts; only one of them runs at a time.
+    unsafe { (*TICK.0.get()).assume_init_mut() }
+}
+
 #[interrupt]
 fn DMA1_STREAM7() {
     board::TICK_PULSE.drive(true);
-    // SAFETY: see `TickCell`; this is one of its two interrupts.
-    if let Some(tick) = unsafe { &mut *TICK.0.get() } {
-        tick.ran = true;
-        tick.run(Some(adc_scan::take()));
-    }
+    // SAFETY: this is one of the two interrupts.
+    let tick = unsafe { the_tick() };
+    tick.ran = true;
+    tick.run(Some(adc_scan::take()));
     board::TICK_PULSE.drive(false);
 }
 
 #[interrupt]
 fn TIM6_DAC() {
     adc_scan::acknowledge_period();
-    // SAFETY: see `TickCell`; this is the other of its two interrupts.
-    if let Some(tick) = unsafe { &mut *TICK.0.get() }
-        && !core::mem::take(&mut tick.ran)
-    {
+    // SAFETY: this is the other of the two interrupts.
+    let tick = unsafe { the_tick() };
+    if !core::mem::take(&mut tick.ran) {
         board::TICK_PULSE.drive(true);
         tick.missed_scans = tick.missed_scans.saturating_add(1);
         tick.run(None);
