@@ -5,6 +5,7 @@
 //! compared is the same for all of them.
 
 pub mod analysis;
+pub mod drive;
 pub mod noise;
 pub mod record;
 pub mod saturation;

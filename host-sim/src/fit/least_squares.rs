@@ -134,13 +134,41 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     }
 }
 
-/// Minimises the sum of squares from the parameters' start values and from `other_starts`.
+/// Minimises the sum of squares from the parameters' start values and from `other_starts`, and
+/// examines what the data tell about the parameters.
 pub fn minimise(
     parameters: &[Parameter],
     other_starts: &[Vec<f64>],
     residuals: &Residuals<'_>,
     options: Options,
 ) -> Result<Solution, FitError> {
+    let Best { at, starts_agreeing } = best_of_starts(parameters, other_starts, residuals, options)?;
+    finish(&Problem { parameters, residuals, at }, starts_agreeing, options)
+}
+
+/// Minimises like [`minimise`] without examining the result: for parameters that are nuisances, or are
+/// examined together with others elsewhere.
+pub fn search(
+    parameters: &[Parameter],
+    other_starts: &[Vec<f64>],
+    residuals: &Residuals<'_>,
+    options: Options,
+) -> Result<Vec<f64>, FitError> {
+    let Best { at, .. } = best_of_starts(parameters, other_starts, residuals, options)?;
+    Ok(Problem { parameters, residuals, at: at.clone() }.values(&at))
+}
+
+struct Best {
+    at: DVector<f64>,
+    starts_agreeing: usize,
+}
+
+fn best_of_starts(
+    parameters: &[Parameter],
+    other_starts: &[Vec<f64>],
+    residuals: &Residuals<'_>,
+    options: Options,
+) -> Result<Best, FitError> {
     let first: Vec<f64> = parameters.iter().map(|parameter| parameter.start).collect();
     let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
     let mut last_reason = None;
@@ -174,10 +202,10 @@ pub fn minimise(
     }
     let best = found.iter().map(|(sum, _)| *sum).fold(f64::INFINITY, f64::min);
     let starts_agreeing = found.iter().filter(|(sum, _)| *sum <= best * 1.01).count();
-    let Some((_, at)) = found.into_iter().find(|(sum, _)| *sum <= best) else {
-        return Err(last_reason.unwrap_or(FitError::NotFinite));
-    };
-    finish(&Problem { parameters, residuals, at }, starts_agreeing, options)
+    match found.into_iter().find(|(sum, _)| *sum <= best) {
+        Some((_, at)) => Ok(Best { at, starts_agreeing }),
+        None => Err(last_reason.unwrap_or(FitError::NotFinite)),
+    }
 }
 
 fn check_bounds(parameters: &[Parameter], start: &[f64]) -> Result<(), FitError> {

@@ -1,0 +1,194 @@
+//! The drive alone: inertia, bearing, shaft and motor, from torque and angle or force and position.
+//!
+//! Works on drive logs and on contact logs; in the latter the friction torque that the bridge measured
+//! is a known load. The baseline is M q̈ + Fv q̇ + Fc d(q) and the timing of the channels; an offset is
+//! not part of it, because it is a cause that can be named.
+//!
+//! What is minimised is the error of force, not of position: force noise is white and the encoder's is
+//! known, so the whitened residual ([`whitening`]) is a maximum-likelihood one where both hold. Noise
+//! in the regressors is small behind the position filter and enters through the whitening's density.
+
+pub mod backlash;
+pub mod bearing_asymmetry;
+pub mod bearing_stribeck;
+pub mod conditioned;
+pub mod drive_delay;
+pub mod effect;
+pub mod m2_ripple;
+pub mod model;
+pub mod noise;
+pub mod output;
+pub mod presliding;
+pub mod shaft;
+pub mod shaft_torsion;
+pub mod slow;
+pub mod solve;
+pub mod torque_offset;
+pub mod units;
+pub mod whitening;
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use conditioned::DriveLog;
+use effect::{DriveEffect, Known};
+use model::{Filtered, Model, Part, Shapes, baseline_names};
+use solve::Solved;
+
+use super::analysis::{Analysis, Fit, Role};
+use crate::files::effect_id::Subsystem;
+use crate::files::log::Log;
+
+/// The drive's effects in the order of the contract.
+static EFFECTS: [&dyn DriveEffect; 8] = [
+    &shaft_torsion::ShaftTorsion,
+    &backlash::Backlash,
+    &m2_ripple::M2Ripple,
+    &bearing_asymmetry::BearingAsymmetry,
+    &torque_offset::TorqueOffset,
+    &bearing_stribeck::BearingStribeck,
+    &presliding::Presliding,
+    &drive_delay::DriveDelay,
+];
+
+/// The drive's analysis of a set of logs.
+pub struct DriveAnalysis {
+    logs: Vec<Filtered>,
+    solved: Mutex<HashMap<Vec<&'static str>, Arc<Solved>>>,
+}
+
+impl DriveAnalysis {
+    /// Conditions logs; training logs must come first.
+    pub fn new(logs: &[(&Log, Role)]) -> Result<Self, String> {
+        let conditioned =
+            logs.iter().map(|(log, role)| DriveLog::new(log, *role)).collect::<Result<Vec<_>, _>>()?;
+        Self::from_logs(conditioned)
+    }
+
+    /// An analysis of conditioned logs.
+    pub fn from_logs(logs: Vec<DriveLog>) -> Result<Self, String> {
+        // The whitening needs the inertia: it is found with force noise alone, twice is enough since
+        // the filter's gain depends on it only where encoder noise outweighs force noise.
+        let mut inertia = 0.0;
+        let mut filtered: Vec<Filtered> = logs.into_iter().map(|log| Filtered::new(log, inertia)).collect();
+        for _ in 0..2 {
+            let rest = Shapes { values: Vec::new(), origins: vec![0.0; filtered.len()] };
+            let model = Model { logs: &filtered, parts: &[] };
+            inertia = solve::solve(&model, rest, &[])?.sizes.values[0].max(0.0);
+            filtered = filtered.into_iter().map(|f| Filtered::new(f.log, inertia)).collect();
+        }
+        Ok(Self { logs: filtered, solved: Mutex::new(HashMap::new()) })
+    }
+
+    fn train(&self) -> Vec<&DriveLog> {
+        self.logs.iter().map(|f| &f.log).filter(|log| log.role == Role::Train).collect()
+    }
+
+    /// Fits a combination, from a fit with fewer effects.
+    pub fn solve(&self, effects: &[&'static str], near: &[&'static str]) -> Result<Arc<Solved>, String> {
+        let known = |key: &[&'static str]| {
+            let solved = self.solved.lock().unwrap_or_else(PoisonError::into_inner);
+            solved.get(&sorted(key)).cloned()
+        };
+        if let Some(solved) = known(effects) {
+            return Ok(solved);
+        }
+        let near: Vec<&'static str> = near.iter().copied().filter(|id| effects.contains(id)).collect();
+        let start = match known(&near) {
+            Some(solved) => Some(solved),
+            None if effects.is_empty() => None,
+            None => Some(self.solve(&near, &[]).or_else(|_| self.solve(&[], &[]))?),
+        };
+        let solved = Arc::new(self.extend(start.as_deref(), effects)?);
+        self.solved.lock().unwrap_or_else(PoisonError::into_inner).insert(sorted(effects), solved.clone());
+        Ok(solved)
+    }
+
+    fn extend(&self, from: Option<&Solved>, effects: &[&'static str]) -> Result<Solved, String> {
+        let mut parts: Vec<Part> = Vec::new();
+        let mut shapes = Shapes { values: Vec::new(), origins: vec![0.0; self.logs.len()] };
+        let mut grids = Vec::new();
+        let known = from.map(|from| self.known(from, effects));
+        if let Some(from) = from {
+            shapes.origins.clone_from(&from.shapes.origins);
+        }
+        for id in effects {
+            let old = from.and_then(|from| {
+                let at = from.parts.iter().position(|part| part.id == *id)?;
+                Some((from, at))
+            });
+            // The asymmetry's columns depend on whether an offset is in the model.
+            let rebuilt = *id == "bearing_asymmetry";
+            if let Some((from, at)) = old.filter(|_| !rebuilt) {
+                let before: usize = from.parts[..at].iter().map(|p| p.prepared.shapes().len()).sum();
+                let count = from.parts[at].prepared.shapes().len();
+                shapes.values.extend(&from.shapes.values[before..before + count]);
+                parts.push(from.parts[at].clone());
+                continue;
+            }
+            let effect = EFFECTS
+                .iter()
+                .find(|effect| effect.id() == *id)
+                .ok_or_else(|| format!("{id}: not an effect of the drive"))?;
+            let Some(known) = &known else { return Err("an effect needs a baseline".into()) };
+            let prepared = effect.prepare(&self.train(), known)?;
+            let at = shapes.values.len();
+            shapes.values.extend(prepared.shapes().iter().map(|shape| shape.start));
+            if !prepared.starts().is_empty() {
+                grids.push((at, prepared.starts().to_vec()));
+            }
+            if let Some(origins) = prepared.origins() {
+                shapes.origins[..origins.starts.len()].copy_from_slice(origins.starts);
+            }
+            parts.push(Part { id: effect.id(), prepared });
+        }
+        let model = Model { logs: &self.logs, parts: &parts };
+        solve::solve(&model, shapes, &grids)
+    }
+
+    fn known(&self, solved: &Solved, effects: &[&'static str]) -> Known {
+        let model = Model { logs: &self.logs, parts: &solved.parts };
+        let residual = (0..self.logs.len())
+            .filter(|&i| self.logs[i].log.role == Role::Train)
+            .map(|i| {
+                let mut left = model.net_effort(&solved.shapes, i);
+                for (column, size) in model.regressors(&solved.shapes, i).iter().zip(&solved.sizes.values) {
+                    left.iter_mut().zip(column).for_each(|(left, x)| *left -= size * x);
+                }
+                left
+            })
+            .collect();
+        let effects = effects.to_vec();
+        Known { slow: slow::fit(&self.train(), &solved.sizes.values), residual, effects }
+    }
+}
+
+fn sorted(effects: &[&'static str]) -> Vec<&'static str> {
+    let mut key = effects.to_vec();
+    key.sort_unstable();
+    key
+}
+
+impl Analysis for DriveAnalysis {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Drive
+    }
+
+    fn baseline_kind(&self) -> &str {
+        "drive"
+    }
+
+    fn candidates(&self) -> Vec<&'static str> {
+        EFFECTS.iter().map(|effect| effect.id()).collect()
+    }
+
+    fn fit(&self, effects: &[&'static str], near: Option<&Fit>) -> Result<Fit, String> {
+        let near = near.map_or(&[][..], |fit| &fit.effects);
+        let solved = self.solve(effects, near)?;
+        Ok(output::fit(&self.logs, &solved, effects))
+    }
+
+    fn evidence(&self, effect: &'static str, fit: &Fit) -> Vec<String> {
+        output::evidence(effect, fit, baseline_names(self.logs[0].log.motion))
+    }
+}

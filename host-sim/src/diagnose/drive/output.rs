@@ -1,0 +1,272 @@
+//! A fitted drive in the form that the comparison of causes reads.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::{Filtered, Model, Shapes, delayed, gross, is_timing};
+use super::solve::Solved;
+use crate::diagnose::analysis::{Channel, Estimate, Fit, LogFit, Role};
+use crate::fit::covariance;
+
+/// Step of a difference for the derivative by a shape, of its range.
+const SHAPE_STEP: f64 = 1e-3;
+
+/// What is fitted beside the sizes: a shape, or a log's origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Nonlinear {
+    Shape { at: usize, step: f64 },
+    Origin { log: usize, step: f64 },
+}
+
+/// The fit with residuals and sensitivities of all logs.
+pub fn fit(logs: &[Filtered], solved: &Solved, effects: &[&'static str]) -> Fit {
+    let model = Model { logs, parts: &solved.parts };
+    let (nonlinear, mut parameters) = nonlinear(&model, solved);
+    let linear: Vec<Estimate> = solved
+        .names
+        .iter()
+        .zip(&solved.sizes.values)
+        .map(|(name, value)| Estimate {
+            effect: name.effect,
+            name: name.name.clone(),
+            value: *value,
+            std: f64::NAN,
+            log: None,
+        })
+        .collect();
+    let linear_count = linear.len();
+    parameters.splice(0..0, linear);
+    let channels: Vec<Channel> =
+        (0..logs.len()).map(|index| channel(&model, solved, index, &nonlinear)).collect();
+    set_std(&mut parameters, &channels, logs, solved, linear_count);
+    for part in &solved.parts {
+        let constant = |(name, value)| Estimate { effect: Some(part.id), name, value, std: 0.0, log: None };
+        parameters.extend(part.prepared.constants().into_iter().map(constant));
+    }
+    let logs =
+        channels.into_iter().enumerate().map(|(i, channel)| log_fit(&model, solved, i, channel)).collect();
+    Fit { effects: effects.to_vec(), parameters, logs }
+}
+
+fn nonlinear(model: &Model<'_>, solved: &Solved) -> (Vec<Nonlinear>, Vec<Estimate>) {
+    let (mut places, mut estimates) = (Vec::new(), Vec::new());
+    let mut at = 0;
+    for part in &solved.parts {
+        for shape in part.prepared.shapes() {
+            let value = solved.shapes.values[at];
+            let room = (shape.high - value).max(value - shape.low);
+            let step = (SHAPE_STEP * shape.typical(value)).min(0.5 * room);
+            let step = if value + step <= shape.high { step } else { -step };
+            places.push(Nonlinear::Shape { at, step });
+            let name = shape.name.clone();
+            estimates.push(Estimate { effect: Some(part.id), name, value, std: f64::NAN, log: None });
+            at += 1;
+        }
+        if let Some(origins) = part.prepared.origins() {
+            for log in 1..model.logs.len() {
+                places.push(Nonlinear::Origin { log, step: 0.1 * origins.step });
+                let value = solved.shapes.origins[log];
+                let name = "origin".to_string();
+                estimates.push(Estimate {
+                    effect: Some(part.id),
+                    name,
+                    value,
+                    std: f64::NAN,
+                    log: Some(log),
+                });
+            }
+        }
+    }
+    (places, estimates)
+}
+
+fn channel(model: &Model<'_>, solved: &Solved, index: usize, nonlinear: &[Nonlinear]) -> Channel {
+    let problem = model.whitened(&solved.shapes, index);
+    let residual = problem.residual(&solved.sizes.values);
+    let mut sensitivity: Vec<Vec<f64>> =
+        problem.columns.iter().map(|column| column.iter().map(|x| -x).collect()).collect();
+    for place in nonlinear {
+        let mut shapes: Shapes = solved.shapes.clone();
+        let step = match *place {
+            Nonlinear::Shape { at, step } => {
+                shapes.values[at] += step;
+                step
+            }
+            Nonlinear::Origin { log, step } if log == index => {
+                shapes.origins[log] += step;
+                step
+            }
+            Nonlinear::Origin { .. } => {
+                sensitivity.push(Vec::new());
+                continue;
+            }
+        };
+        let moved = model.whitened(&shapes, index).residual(&solved.sizes.values);
+        sensitivity.push(moved.iter().zip(&residual).map(|(a, b)| (a - b) / step).collect());
+    }
+    let filtered = &model.logs[index];
+    let positions = filtered.whitener.positions(filtered.log.len());
+    let mask = masked(filtered, &positions);
+    Channel {
+        name: "force",
+        time_s: positions.iter().map(|at| filtered.log.record.time_s(*at)).collect(),
+        residual: residual.iter().zip(mask).map(|(r, masked)| if masked { f64::NAN } else { *r }).collect(),
+        sensitivity,
+        samples_per_noise: filtered.whitener.samples_per_noise,
+    }
+}
+
+/// Outputs of the filter whose centre does not count.
+fn masked(filtered: &Filtered, positions: &[usize]) -> Vec<bool> {
+    positions.iter().map(|&at| filtered.log.weight[at] == 0.0).collect()
+}
+
+fn set_std(
+    parameters: &mut [Estimate],
+    channels: &[Channel],
+    logs: &[Filtered],
+    solved: &Solved,
+    linear_count: usize,
+) {
+    let train: Vec<usize> = (0..logs.len()).filter(|&i| logs[i].log.role == Role::Train).collect();
+    let rows: usize = train.iter().map(|&i| channels[i].residual.len()).sum();
+    let free: Vec<usize> = (0..parameters.len())
+        .filter(|&p| {
+            let held = p < linear_count && is_timing(&solved.names[p]);
+            let known = train.iter().any(|&i| channels[i].sensitivity[p].iter().any(|x| *x != 0.0));
+            known && !held
+        })
+        .collect();
+    let mut jacobian = DMatrix::zeros(rows, free.len());
+    let mut residual = DVector::zeros(rows);
+    let mut row = 0;
+    for &i in &train {
+        let channel = &channels[i];
+        for (k, r) in channel.residual.iter().enumerate() {
+            if r.is_finite() {
+                residual[row] = *r;
+                for (column, &p) in free.iter().enumerate() {
+                    jacobian[(row, column)] = channel.sensitivity[p].get(k).copied().unwrap_or(0.0);
+                }
+            }
+            row += 1;
+        }
+    }
+    if let Some(covariance) = covariance::sandwich(&jacobian, &residual) {
+        for (column, &p) in free.iter().enumerate() {
+            parameters[p].std = covariance[(column, column)].max(0.0).sqrt();
+        }
+    }
+}
+
+/// Measured and predicted effort as the contract compares them: decimated to 100 Hz.
+fn log_fit(model: &Model<'_>, solved: &Solved, index: usize, channel: Channel) -> LogFit {
+    let log = &model.logs[index].log;
+    let mut predicted = vec![0.0; log.len()];
+    let columns = model.regressors(&solved.shapes, index);
+    for (column, size) in columns.iter().zip(&solved.sizes.values) {
+        predicted.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
+    }
+    let time_of = |name: &str| {
+        let at = solved.names.iter().position(|n| is_timing(n) && n.name == name);
+        at.map_or(0.0, |at| solved.sizes.values[at])
+    };
+    let step_s = log.record.step_s;
+    if let Some(contact) = &log.contact {
+        // The true friction is the measured one of `friction_timing_s` later.
+        let friction = delayed(&contact.friction, -time_of("friction_timing_s") / step_s);
+        predicted.iter_mut().zip(&friction).for_each(|(sum, t)| *sum += t);
+    }
+    // The effort of now moves the drive a delay later: what it is now, the motion of then asks for.
+    let delay_s = model.delay_s(&solved.shapes).unwrap_or_else(|| time_of("torque_timing_s"));
+    let predicted = delayed(&predicted, -delay_s / step_s);
+    let decimator = log.decimator();
+    let positions = decimator.positions(log.len());
+    let reach = (0.5 * log.record.rate_hz() / super::conditioned::REPORT_HZ).ceil() as usize;
+    let used = positions
+        .iter()
+        .map(|&at| {
+            let near = &log.weight[at.saturating_sub(reach)..(at + reach + 1).min(log.len())];
+            near.iter().all(|w| *w > 0.0)
+        })
+        .collect();
+    let noise = noise_std(model, solved, index);
+    LogFit {
+        role: log.role,
+        time_s: positions.iter().map(|at| log.record.time_s(*at)).collect(),
+        measured: decimator.apply(&gross(log)),
+        predicted: decimator.apply(&predicted),
+        noise_std: vec![noise; positions.len()],
+        used,
+        channels: vec![channel],
+    }
+}
+
+/// Standard deviation of the decimated force error that the noise of both channels gives.
+fn noise_std(model: &Model<'_>, solved: &Solved, index: usize) -> f64 {
+    let log = &model.logs[index].log;
+    let rate_hz = log.record.rate_hz();
+    let limit_hz = (0.5 * super::conditioned::REPORT_HZ).min(0.5 * rate_hz);
+    let force = log.force_std.powi(2) * 2.0 * limit_hz / rate_hz;
+    // ∫ (2πf)⁴ df over the band.
+    let omega = 2.0 * std::f64::consts::PI;
+    let curved = omega.powi(4) * limit_hz.powi(5) / 5.0 * 2.0 / rate_hz;
+    (force + curved * (solved.sizes.values[0] * log.position_std).powi(2)).sqrt()
+}
+
+/// Sentences with numbers about one effect in a fit.
+pub fn evidence(effect: &'static str, fit: &Fit, baseline: [&str; 3]) -> Vec<String> {
+    let own: Vec<&Estimate> = fit.parameters.iter().filter(|p| p.effect == Some(effect)).collect();
+    let mut sentences = Vec::new();
+    let significant: Vec<String> = own
+        .iter()
+        .filter(|p| p.std > 0.0 && p.log.is_none())
+        .map(|p| format!("{} = {:.4} ± {:.1e}", p.name, p.value, p.std))
+        .collect();
+    if !significant.is_empty() {
+        sentences.push(format!("fitted to the force error of the inverse model: {}", significant.join(", ")));
+    }
+    let coulomb = fit.get(None, baseline[2]).map(|p| p.value);
+    let value = |name: &str| own.iter().find(|p| p.name.starts_with(name)).map(|p| p.value);
+    let more = match effect {
+        "torque_offset" => value("offset").zip(coulomb).map(|(offset, coulomb)| {
+            format!(
+                "the force error has the same mean in both directions: {:.1} % of Coulomb friction",
+                100.0 * offset / coulomb
+            )
+        }),
+        "bearing_asymmetry" => value("viscous_difference").map(|half| {
+            format!("viscous friction differs by {:.4} between forward and backward", 2.0 * half)
+        }),
+        "bearing_stribeck" => value("stribeck_speed").map(|speed| {
+            format!("friction falls with speed below about {speed:.3e}, on the way up and down alike")
+        }),
+        "presliding" => value("yield_length").map(|length| {
+            format!("after reversals friction builds up over {length:.3e} of travel, whatever the speed")
+        }),
+        "drive_delay" => value("delay_s").map(|delay| {
+            format!("motion follows the effort {:.2} ms later, in fast and slow motion", 1e3 * delay)
+        }),
+        "shaft_torsion" => value("natural_frequency_hz").map(|hz| {
+            format!("the force error rings at {hz:.1} Hz after fast changes, in proportion to them")
+        }),
+        "backlash" => value("gap")
+            .map(|gap| format!("at torque reversals the motor moves {gap:.3e} with its own inertia alone")),
+        "m2_ripple" => {
+            let lines: Vec<String> = (1..=own.len())
+                .filter_map(|i| {
+                    let name = |what: &str| format!("{what}_{i}");
+                    let wave = value(&name("order")).map(|n| format!("order {n:.0}")).or_else(|| {
+                        value(&name("wavelength")).map(|l| format!("wavelength {:.4} mm", 1e3 * l))
+                    })?;
+                    let size = value(&name("cos"))?.hypot(value(&name("sin"))?);
+                    Some(format!("{wave}: {size:.4}"))
+                })
+                .collect();
+            (!lines.is_empty())
+                .then(|| format!("the force error repeats with position: {}", lines.join(", ")))
+        }
+        _ => None,
+    };
+    sentences.extend(more);
+    sentences
+}

@@ -1,0 +1,128 @@
+//! Motor and disc coupled by a shaft that twists, with or without a dead zone: what the disc does when
+//! the motor moves as measured.
+//!
+//! Per unit of the disc's inertia: θ̈₂ = w − f(θ̇₂), w = s(θ₁ − θ₂) + b (θ̇₁ − θ̇₂). The motor then has to
+//! deliver J₁ θ̈₁ + J₂ w, so w is a regressor. f is the disc's share of friction per inertia.
+//! A shaft alone: s = ω² x (1 + κ (x/x₀)²), x₀ the twist at the typical acceleration. With a gap β:
+//! s = s₀ (d/x₀)ⁿ outside of it, d = |x| − β/2; n = 1 is a sharp flank, n = 1.5 a Hertzian contact, more
+//! a rough or lubricated one; the damper acts in contact and never pulls.
+//! With the encoder on the motor this simulation is driven by measured motion and cannot drift: the
+//! spring ties the disc to it.
+//! Semi-implicit Euler with steps that resolve the stiffest slope. Source: two-mass drives, e.g.
+//! Schröder, Elektrische Antriebe; for the dead zone Nordin and Gutman (2002), Hunt and Crossley (1975).
+
+use super::conditioned::DriveLog;
+
+/// Elastic part of the coupling, per inertia of the disc.
+#[derive(Debug, Clone, Copy)]
+pub enum Spring {
+    /// No gap: ω² x (1 + κ (x/x₀)²).
+    Shaft {
+        /// ω², 1/s².
+        stiffness: f64,
+        /// κ/x₀².
+        hardening: f64,
+    },
+    /// A gap: s₀ (d/x₀)ⁿ.
+    Flanks {
+        /// Half of the gap.
+        half_gap: f64,
+        /// s₀/x₀ⁿ.
+        factor: f64,
+        /// n.
+        exponent: f64,
+        /// Largest slope that is resolved.
+        steepest: f64,
+    },
+}
+
+/// Properties of the coupling.
+#[derive(Debug, Clone, Copy)]
+pub struct Shaft {
+    /// Elastic part.
+    pub spring: Spring,
+    /// Damping over the disc's inertia, 1/s.
+    pub damping: f64,
+    /// Coulomb friction of the disc over its inertia.
+    pub coulomb: f64,
+    /// Viscous friction of the disc over its inertia.
+    pub viscous: f64,
+}
+
+/// Steps are at most this share of 1/ω.
+const STEP_SHARE: f64 = 0.25;
+
+impl Spring {
+    fn pull(&self, strain: f64) -> f64 {
+        match *self {
+            Self::Shaft { stiffness, hardening } => stiffness * strain * (1.0 + hardening * strain * strain),
+            Self::Flanks { half_gap, factor, exponent, .. } => {
+                let depth = strain.abs() - half_gap;
+                if depth <= 0.0 { 0.0 } else { (factor * depth.powf(exponent)).copysign(strain) }
+            }
+        }
+    }
+
+    fn steepest(&self) -> f64 {
+        match *self {
+            Self::Shaft { stiffness, .. } => 2.0 * stiffness,
+            Self::Flanks { steepest, .. } => steepest,
+        }
+    }
+
+    fn has_gap(&self) -> bool {
+        matches!(self, Self::Flanks { .. })
+    }
+}
+
+impl Shaft {
+    /// The shaft's torque over the disc's inertia, at each sample.
+    pub fn torque_per_inertia(&self, log: &DriveLog) -> Vec<f64> {
+        let step_s = log.record.step_s;
+        let rate = self.spring.steepest().sqrt().max(self.damping);
+        let splits = (rate * step_s / STEP_SHARE).ceil().clamp(1.0, 100.0);
+        let h = step_s / splits;
+        let gap = self.spring.has_gap();
+        let (Some(&first), Some(&speed)) = (log.position.first(), log.speed.first()) else {
+            return Vec::new();
+        };
+        let (mut x, mut v) = (first, speed);
+        let mut torque = vec![0.0; log.len()];
+        for (i, torque) in torque.iter_mut().enumerate().skip(1) {
+            let (p0, p1) = (log.position[i - 1], log.position[i]);
+            let (s0, s1) = (log.speed[i - 1], log.speed[i]);
+            // Cubic through both ends' positions and speeds.
+            let (a, b) = (step_s * s0 - (p1 - p0), (p1 - p0) - step_s * s1);
+            let mut w = 0.0;
+            for k in 1..=splits as usize {
+                let t = k as f64 / splits;
+                let motor = p0 + t * (p1 - p0) + t * (1.0 - t) * (a * (1.0 - t) + b * t);
+                let motor_speed = s0 + t * (s1 - s0);
+                let pull = self.spring.pull(motor - x);
+                w = pull + self.damping * (motor_speed - v);
+                if gap && w * pull <= 0.0 {
+                    w = 0.0;
+                }
+                // Coulomb friction cannot turn the disc around within a step.
+                let free = v + h * (w - self.viscous * v);
+                let stop = h * self.coulomb;
+                v = if free.abs() <= stop { 0.0 } else { free - stop.copysign(free) };
+                x += h * v;
+            }
+            *torque = w;
+        }
+        torque
+    }
+}
+
+/// Root mean square of a log's acceleration where it counts: the typical torque over inertia.
+pub fn typical_acceleration(logs: &[&DriveLog]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for log in logs {
+        for (a, w) in log.acceleration.iter().zip(&log.weight) {
+            sum += w * a * a;
+            count += w;
+        }
+    }
+    (sum / f64::max(count, 1.0)).sqrt().max(1e-12)
+}
