@@ -108,12 +108,15 @@ impl Record {
         match message {
             Message::Telemetry(row) => {
                 self.heard_s = now_s;
+                if self.ending {
+                    return;
+                }
                 if !self.keep_rows {
                     recorded.rows.clear();
                 }
                 recorded.rows.push(row);
                 let enough = u64::from(row.sequence) * u64::from(self.every_ticks) >= self.ticks;
-                if enough && !self.ending {
+                if enough {
                     self.ending = true;
                     self.ask.push(Command::Telemetry { every_ticks: 0 });
                 }
