@@ -1,3 +1,24 @@
 //! The virtual bench: the release ELF, unmodified, on an emulated STM32H743 in closed loop with the plant.
 
+pub mod bench;
+pub mod board;
+pub mod cli;
+pub mod defmt_log;
+pub mod desk;
+pub mod desk_link;
+mod driver;
+pub mod elf;
+pub mod error;
+pub mod experiment;
+pub mod firmware_build;
+pub mod gaps;
+pub mod meter;
+pub mod outside;
 pub mod part;
+pub mod pins;
+pub mod plant_side;
+pub mod record;
+pub mod rtt;
+pub mod serial;
+
+pub use driver::PERIOD;

@@ -1,3 +1,7 @@
 //! `cargo virtual-bench`.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    virtual_bench::cli::main()
+}

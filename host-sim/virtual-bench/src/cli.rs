@@ -1,0 +1,179 @@
+//! The command line of `cargo virtual-bench`.
+
+use crate::elf::Firmware;
+use crate::error::BenchError;
+use crate::experiment::{self, Done, Request};
+use crate::firmware_build;
+use clap::{ArgGroup, Parser};
+use host_sim::cli::common::SetArgs;
+use host_sim::cli::progress::Progress;
+use host_sim::files::experiment_file::ExperimentFile;
+use host_sim::files::model_file::ModelFile;
+use host_sim::files::output_dir::OutputDir;
+use host_sim::files::rig_file::RigFile;
+use host_sim::summary::{RunFacts, Summary, summarise};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Exit status for bad input, as in `rig`.
+const BAD_INPUT: u8 = 2;
+
+/// Runs the release ELF on an emulated STM32H743 in closed loop with the plant.
+#[derive(Parser, Debug)]
+#[command(
+    name = "virtual-bench",
+    version,
+    group(ArgGroup::new("what").required(true)),
+    after_long_help = "\
+Examples:
+  cargo virtual-bench --experiment fig20 --out target/bench/fig20
+  cargo virtual-bench --experiment fig20 --observer model-extended.toml --out target/bench/extended
+
+An experiment writes log.csv (as the host tool recorded it from the serial link), summary.json and defmt.log
+(the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
+Exit status: 0 on success, 2 for bad input, 1 for everything else."
+)]
+struct Cli {
+    /// fig18 … fig23, or an experiment file (TOML)
+    #[arg(long, value_name = "NAME|FILE.toml", group = "what", requires = "out")]
+    experiment: Option<String>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Rig file (TOML) of the plant; where it differs from the assumed rig the firmware gets it as settings
+    #[arg(long, value_name = "RIG.toml")]
+    rig: Option<PathBuf>,
+    /// Model file (TOML) of the elements on the disc
+    #[arg(long, value_name = "MODEL.toml")]
+    model: Option<PathBuf>,
+    /// Model file (TOML) for the firmware's observer, uploaded over the link; that of the elements where left out
+    #[arg(long, value_name = "MODEL.toml")]
+    observer: Option<PathBuf>,
+    /// This ELF in place of the one built from firmware/
+    #[arg(long, value_name = "ELF")]
+    elf: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArgs,
+}
+
+/// `summary.json` of the bench: that of the PC rig, and what only the bench knows.
+#[derive(Serialize)]
+struct BenchSummary {
+    #[serde(flatten)]
+    summary: Summary,
+    instructions_per_tick: MeanAndMax,
+    elf_sha256: String,
+}
+
+#[derive(Serialize)]
+struct MeanAndMax {
+    mean: f64,
+    max: u64,
+}
+
+/// Parses the command line and does what it says.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse_arguments(&error),
+    };
+    match run(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("virtual-bench: {error}");
+            match error {
+                BenchError::Input(_) => ExitCode::from(BAD_INPUT),
+                _ => ExitCode::FAILURE,
+            }
+        }
+    }
+}
+
+/// Help and version go out as they are; a wrong argument becomes one line.
+fn refuse_arguments(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        // Nobody is left to tell where even the help cannot be printed.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    let said: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let said = said.join(" ");
+    eprintln!("virtual-bench: {}; see --help", said.strip_prefix("error: ").unwrap_or(&said));
+    ExitCode::from(BAD_INPUT)
+}
+
+fn run(cli: Cli) -> Result<(), BenchError> {
+    let experiment = cli.experiment.clone().unwrap_or_default();
+    run_experiment(cli, &experiment)
+}
+
+fn firmware(elf: Option<PathBuf>) -> Result<Firmware, BenchError> {
+    let path = match elf {
+        Some(path) => path,
+        None => firmware_build::release_elf()?,
+    };
+    Firmware::read(&path)
+}
+
+fn run_experiment(cli: Cli, name: &str) -> Result<(), BenchError> {
+    let overrides = cli.set.overrides()?;
+    let model = ModelFile::read_or_assumed(cli.model.as_deref(), &overrides.model)?;
+    let request = Request {
+        experiment: ExperimentFile::named_or_read(name, &overrides.experiment)?,
+        rig: RigFile::read_or_assumed(cli.rig.as_deref(), &overrides.rig)?,
+        observer: match &cli.observer {
+            Some(path) => ModelFile::read(path, &[])?,
+            None => model.clone(),
+        },
+        model,
+    };
+    let Some(out) = cli.out else { return Ok(()) };
+    let mut output = OutputDir::new(&out)?;
+    let firmware = firmware(cli.elf)?;
+    let started = Instant::now();
+    let mut progress: Option<Progress> = None;
+    let done = experiment::run(&firmware, &request, |ticks, total| {
+        progress
+            .get_or_insert_with(|| Progress::new(&request.experiment.name, u64::from(total)))
+            .set(u64::from(ticks));
+    })?;
+    let summary = summary(&request, &done, &firmware, started.elapsed().as_secs_f64())?;
+    output.write_log(&done.csv())?;
+    output.write_json("summary.json", &summary)?;
+    output.write("defmt.log", done.log.lines.join("\n") + "\n")?;
+    output.finish()?;
+    let complaints = done.complaints();
+    if complaints.is_empty() { Ok(()) } else { Err(BenchError::Rig(complaints.join("; "))) }
+}
+
+fn summary(
+    request: &Request,
+    done: &Done,
+    firmware: &Firmware,
+    wall_s: f64,
+) -> Result<BenchSummary, BenchError> {
+    let health = done.run.health.unwrap_or_default();
+    let facts = RunFacts {
+        wall_s,
+        simulated_s: done.record.last_at as f64 * 1e-9,
+        control_ticks: health.tick,
+        deadline_misses: u64::from(health.deadline_misses).max(done.ticks.late),
+    };
+    Ok(BenchSummary {
+        summary: summarise(&request.experiment, &done.csv(), facts)?,
+        instructions_per_tick: MeanAndMax {
+            mean: done.ticks.instructions.mean(),
+            max: done.ticks.instructions.max,
+        },
+        elf_sha256: firmware.sha256.clone(),
+    })
+}

@@ -1,0 +1,192 @@
+//! The operator's desk: where code outside the emulator sits, in step with virtual time.
+//!
+//! The operator is ordinary blocking code on a thread of its own. It and the emulator never run at once: at
+//! the start of each control period the emulator hands over whatever came down the serial line, and goes on
+//! only when the operator waits for more, or for an instant. So the operator's wall-clock speed does not
+//! matter, and two runs are the same run.
+
+use crate::error::BenchError;
+use crate::meter::Ticks;
+use crate::outside::{Action, DriveInputs};
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+/// From the operator to the emulator's side.
+#[derive(Debug)]
+pub(crate) enum ToBench {
+    Send(Vec<u8>),
+    Act(Action),
+    Ask(Question),
+    /// Wake me when bytes come, or at this instant.
+    Wait(u64),
+}
+
+/// What the operator may ask.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Question {
+    BeginMeasuring,
+    EndMeasuring,
+    Outputs,
+    WrongPins,
+    Snapshot,
+}
+
+/// Answers and wake-ups.
+#[derive(Debug)]
+pub(crate) enum ToDesk {
+    Woken { now: u64, bytes: Vec<u8> },
+    Measured(Box<Ticks>),
+    Outputs(DriveInputs),
+    WrongPins(Vec<String>),
+    Done(Result<(), String>),
+}
+
+/// The emulator's end.
+#[derive(Debug)]
+pub(crate) struct BenchEnd {
+    pub(crate) from_desk: Receiver<ToBench>,
+    pub(crate) to_desk: Sender<ToDesk>,
+}
+
+/// The desk.
+#[derive(Debug)]
+pub struct Desk {
+    to_bench: Sender<ToBench>,
+    from_bench: Receiver<ToDesk>,
+    now: u64,
+    received: Vec<u8>,
+}
+
+/// A desk and the emulator's end of it.
+pub(crate) fn desk() -> (Desk, BenchEnd) {
+    let (to_bench, from_desk) = channel();
+    let (to_desk, from_bench) = channel();
+    (Desk { to_bench, from_bench, now: 0, received: Vec::new() }, BenchEnd { from_desk, to_desk })
+}
+
+fn over() -> BenchError {
+    BenchError::Emulator("the run ended while the operator was still at work".to_owned())
+}
+
+impl Desk {
+    /// Waits for the run to begin.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub(crate) fn sit_down(&mut self) -> Result<(), BenchError> {
+        self.wait(0)
+    }
+
+    /// Virtual time in ns: the start of the current control period.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.now
+    }
+
+    /// Sends bytes down the serial line.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), BenchError> {
+        self.to_bench.send(ToBench::Send(bytes.to_vec())).map_err(|_| over())
+    }
+
+    /// Bytes from the serial line: those that came already, or the first that come before the instant
+    /// `until_ns`; none when it has passed.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn receive(&mut self, until_ns: u64) -> Result<Vec<u8>, BenchError> {
+        if self.received.is_empty() && self.now < until_ns {
+            self.wait(until_ns)?;
+        }
+        Ok(std::mem::take(&mut self.received))
+    }
+
+    /// Waits for an instant; bytes that come meanwhile are kept.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn wait_until(&mut self, until_ns: u64) -> Result<(), BenchError> {
+        while self.now < until_ns {
+            self.wait(until_ns)?;
+        }
+        Ok(())
+    }
+
+    /// Does something to the rig, now.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn act(&mut self, action: Action) -> Result<(), BenchError> {
+        self.to_bench.send(ToBench::Act(action)).map_err(|_| over())
+    }
+
+    /// Begins to measure the control ticks.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn begin_measuring(&mut self) -> Result<(), BenchError> {
+        self.ask(Question::BeginMeasuring).map(|_| ())
+    }
+
+    /// Ends it, and gives what was measured.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn end_measuring(&mut self) -> Result<Ticks, BenchError> {
+        match self.ask(Question::EndMeasuring)? {
+            ToDesk::Measured(ticks) => Ok(*ticks),
+            _ => Err(over()),
+        }
+    }
+
+    /// What the chip's pins tell the drives now.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn outputs(&mut self) -> Result<DriveInputs, BenchError> {
+        match self.ask(Question::Outputs)? {
+            ToDesk::Outputs(outputs) => Ok(outputs),
+            _ => Err(over()),
+        }
+    }
+
+    /// A sentence for each pin the firmware has not set up as the board needs it.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn wrong_pins(&mut self) -> Result<Vec<String>, BenchError> {
+        match self.ask(Question::WrongPins)? {
+            ToDesk::WrongPins(wrong) => Ok(wrong),
+            _ => Err(over()),
+        }
+    }
+
+    /// Keeps the state of the whole bench as it is now, for runs that start from it.
+    ///
+    /// # Errors
+    /// The run ended, or the emulator cannot save its state.
+    pub fn snapshot(&mut self) -> Result<(), BenchError> {
+        match self.ask(Question::Snapshot)? {
+            ToDesk::Done(done) => done.map_err(BenchError::Emulator),
+            _ => Err(over()),
+        }
+    }
+
+    fn ask(&mut self, question: Question) -> Result<ToDesk, BenchError> {
+        self.to_bench.send(ToBench::Ask(question)).map_err(|_| over())?;
+        self.from_bench.recv().map_err(|_| over())
+    }
+
+    fn wait(&mut self, until_ns: u64) -> Result<(), BenchError> {
+        self.to_bench.send(ToBench::Wait(until_ns)).map_err(|_| over())?;
+        match self.from_bench.recv().map_err(|_| over())? {
+            ToDesk::Woken { now, bytes } => {
+                self.now = now;
+                self.received.extend(bytes);
+                Ok(())
+            }
+            _ => Err(over()),
+        }
+    }
+}

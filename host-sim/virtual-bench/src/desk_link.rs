@@ -1,0 +1,33 @@
+//! The host tool's link code at the desk: the same procedures as on a serial port, in virtual time.
+
+use crate::desk::Desk;
+use crate::error::BenchError;
+use host_sim::link::client::Client;
+use host_sim::link::procedure::Procedure;
+
+/// Longest time between two looks of a procedure at its clock.
+const LOOK_NS: u64 = 1_000_000;
+
+/// Does `procedure` at the desk, to its end. `watch` sees it after each of its steps.
+///
+/// # Errors
+/// The run ended, the procedure cannot go on, or `watch` refused.
+pub fn perform<P: Procedure>(
+    desk: &mut Desk,
+    client: &mut Client,
+    procedure: &mut P,
+    mut watch: impl FnMut(&mut Desk, &mut P) -> Result<(), BenchError>,
+) -> Result<P::Outcome, BenchError> {
+    loop {
+        procedure.step(desk.now_ns() as f64 * 1e-9, client)?;
+        let outgoing = client.take_outgoing();
+        if !outgoing.is_empty() {
+            desk.send(&outgoing)?;
+        }
+        watch(desk, procedure)?;
+        if let Some(outcome) = procedure.outcome() {
+            return Ok(outcome);
+        }
+        client.receive(&desk.receive(desk.now_ns() + LOOK_NS)?);
+    }
+}

@@ -1,0 +1,57 @@
+//! The firmware's ELF: what the bench needs from it besides the bytes the emulator loads.
+
+use crate::error::BenchError;
+use object::{Object, ObjectSymbol};
+use rigless::image::{self, Image};
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// Handlers that run the control tick; the first one that is reached opens it.
+const TICK_HANDLERS: [&str; 2] = ["DMA1_STREAM7", "TIM6_DAC"];
+/// The handler of the executor's time.
+const THREAD_TIMER_HANDLER: &str = "TIM3";
+
+/// The ELF and what was found in it.
+#[derive(Debug)]
+pub struct Firmware {
+    /// The whole file.
+    pub bytes: Vec<u8>,
+    /// SHA-256 of the file, in hexadecimal.
+    pub sha256: String,
+    /// For the emulator.
+    pub images: Vec<Image>,
+    /// Digest of the images, which ties a snapshot to them.
+    pub digest: [u8; 32],
+    /// Address of the RTT control block.
+    pub rtt_block: u64,
+    /// Addresses of the first instructions of the control tick's interrupt handlers.
+    pub tick_handlers: [u64; 2],
+    /// Address of the first instruction of the handler that wakes the threads.
+    pub thread_timer_handler: u64,
+}
+
+impl Firmware {
+    /// Reads the ELF at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no ELF, or lacks a symbol the bench needs.
+    pub fn read(path: &Path) -> Result<Self, BenchError> {
+        let bad = |why: String| BenchError::Firmware(format!("{}: {why}", path.display()));
+        let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+        let object = object::File::parse(bytes.as_slice()).map_err(|error| bad(error.to_string()))?;
+        let address = |name: &str| {
+            object
+                .symbols()
+                .find(|symbol| symbol.name() == Ok(name))
+                .map(|symbol| symbol.address() & !1)
+                .ok_or_else(|| bad(format!("it has no symbol `{name}`")))
+        };
+        let rtt_block = address("_SEGGER_RTT")?;
+        let tick_handlers = [address(TICK_HANDLERS[0])?, address(TICK_HANDLERS[1])?];
+        let thread_timer_handler = address(THREAD_TIMER_HANDLER)?;
+        let images = vec![Image::new(path, bytes.clone(), None).map_err(|error| bad(error.to_string()))?];
+        let digest = image::digest(&images, None);
+        let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(Self { bytes, sha256, images, digest, rtt_block, tick_handlers, thread_timer_handler })
+    }
+}

@@ -1,0 +1,90 @@
+//! What is around the chip and what can be done to it: switches, drives, wires, supply, and the plant.
+
+use crate::part::Motor;
+use crate::part::encoder_timer::{Edge, Line};
+use rigless::time::VirtualNanos;
+use serde::{Deserialize, Serialize};
+
+/// What reaches the plant in one control period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DriveInputs {
+    /// Torque references as DAC codes; `None` while the chip leaves the pin floating.
+    pub dac: [Option<u16>; 2],
+    /// Drive enables.
+    pub enabled: [bool; 2],
+}
+
+impl DriveInputs {
+    /// Drives off, and no reference other than zero torque: what every fault must end in. While the chip is in
+    /// reset its pins float, and the drives that are off do not mind.
+    #[must_use]
+    pub fn is_safe(&self) -> bool {
+        self.enabled == [false; 2] && self.dac.iter().all(|code| matches!(code, None | Some(2048)))
+    }
+}
+
+/// What the plant shows at the end of a control period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sensors {
+    /// Voltages at the analogue inputs in the order of the scan, µV: friction, normal, M1, M2, supply.
+    pub microvolt: [u32; 5],
+}
+
+/// The plant behind the chip's pins, one control period at a time.
+pub trait PlantSide: Send {
+    /// What it shows before anything moved.
+    fn sensors(&mut self) -> Sensors;
+    /// One control period with these inputs, from `at` on; `edge` takes each encoder's edges in the order of time.
+    fn step(&mut self, at: VirtualNanos, inputs: &DriveInputs, edge: &mut dyn FnMut(Motor, Edge)) -> Sensors;
+    /// The same plant in the same state.
+    fn duplicate(&self) -> Box<dyn PlantSide>;
+}
+
+/// Something done to the rig, at the start of a control period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Action {
+    /// The arm switch is turned.
+    ArmSwitch(bool),
+    /// The emergency stop is pressed (true) or released.
+    EmergencyStop(bool),
+    /// A drive reports healthy or not.
+    DriveHealthy(Motor, bool),
+    /// A line of an encoder sticks at a level, or is free again.
+    EncoderLine(Motor, Line, Option<bool>),
+    /// An analogue input is held at a voltage in µV whatever the plant says, or is free again.
+    AnalogueInput(usize, Option<u32>),
+    /// The converter starts no more scans, or does again.
+    AdcStalled(bool),
+    /// The serial line is cut, or whole again.
+    LinkSilent(bool),
+    /// So many bytes in a million reach the chip with a framing error and flipped bits.
+    LinkGarbled(u32),
+    /// The chip's supply is cut or comes back. Memory other than flash is lost.
+    Power(bool),
+    /// The reset pin is pulled.
+    ResetPin,
+    /// The control tick's handler becomes an endless loop, until the next reset.
+    HangTick,
+    /// The handler of the executor's timer becomes an endless loop, until the next reset: threads starve,
+    /// the tick goes on.
+    HangThreads,
+}
+
+/// Switches, faults in wires, and what the plant shows: everything of the outside that lasts.
+#[derive(Debug, Clone)]
+pub struct Outside {
+    /// The arm switch is on.
+    pub arm_switch: bool,
+    /// The emergency stop is pressed.
+    pub stop_pressed: bool,
+    /// The drives are healthy.
+    pub healthy: [bool; 2],
+    /// Voltages that hide the plant's.
+    pub held_microvolt: [Option<u32>; 5],
+}
+
+impl Default for Outside {
+    fn default() -> Self {
+        Self { arm_switch: false, stop_pressed: false, healthy: [true; 2], held_microvolt: [None; 5] }
+    }
+}

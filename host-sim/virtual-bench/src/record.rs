@@ -1,0 +1,91 @@
+//! What a run leaves behind, and what it keeps for runs that go on from it.
+
+use crate::outside::{DriveInputs, Outside, PlantSide, Sensors};
+use rigless::device::ResetCause;
+use rigless::session::Reset;
+
+/// A restart of the chip.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Restart {
+    /// When, ns.
+    pub at_ns: u64,
+    /// Why, in the emulator's words.
+    pub cause: String,
+}
+
+/// The run's record.
+#[derive(Default)]
+pub struct Record {
+    /// The log's bytes, one entry for each start of the firmware.
+    pub log: Vec<Vec<u8>>,
+    /// Every change of what the drives are told, with its instant in ns.
+    pub outputs: Vec<(u64, DriveInputs)>,
+    /// Restarts.
+    pub restarts: Vec<Restart>,
+    /// The last instant, ns.
+    pub last_at: u64,
+    /// Instructions at that instant.
+    pub instructions: u64,
+    /// The state kept by the operator's wish.
+    pub saved: Option<Saved>,
+}
+
+impl std::fmt::Debug for Record {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Record")
+            .field("restarts", &self.restarts)
+            .field("last_at", &self.last_at)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The whole bench at one instant.
+pub struct Saved {
+    pub(crate) file: Vec<u8>,
+    pub(crate) plant: Box<dyn PlantSide>,
+    pub(crate) sensors: Sensors,
+    pub(crate) outside: Outside,
+    pub(crate) next: u64,
+    pub(crate) resets_seen: usize,
+}
+
+impl Record {
+    pub(crate) fn log_bytes(&mut self, bytes: &[u8]) {
+        if self.log.is_empty() {
+            self.log.push(Vec::new());
+        }
+        if let Some(current) = self.log.last_mut() {
+            current.extend_from_slice(bytes);
+        }
+    }
+
+    pub(crate) fn note_outputs(&mut self, at: u64, outputs: DriveInputs) {
+        if self.outputs.last().is_none_or(|(_, last)| *last != outputs) {
+            self.outputs.push((at, outputs));
+        }
+    }
+
+    pub(crate) fn restarted(&mut self, resets: &[Reset]) {
+        self.log.push(Vec::new());
+        self.restarts.extend(resets.iter().map(|reset| Restart {
+            at_ns: reset.at.0,
+            cause: match reset.cause {
+                ResetCause::Core => "software".to_owned(),
+                ResetCause::Model(instance) => instance.to_owned(),
+                ResetCause::Pin => "reset pin".to_owned(),
+                ResetCause::PowerOn => "power on".to_owned(),
+                other => format!("{other:?}"),
+            },
+        }));
+    }
+
+    /// The first instant from `from_ns` on at which the outputs are safe and stay so to the end of the run.
+    #[must_use]
+    pub fn safe_for_good_from(&self, from_ns: u64) -> Option<u64> {
+        let last_unsafe = self.outputs.iter().rposition(|(_, outputs)| !outputs.is_safe());
+        match last_unsafe {
+            None => Some(from_ns),
+            Some(index) => self.outputs.get(index + 1).map(|(at, _)| (*at).max(from_ns)),
+        }
+    }
+}
