@@ -89,6 +89,10 @@ impl<T: Real> FrictionModel<T> {
                     deformation_m: held / m.stiffness_n_per_m(),
                     deflection_m: held * m.bristles().inverse_sigma0,
                     tip_speed_m_s: contact.sliding_speed_m_s,
+                    mean_tip_speed_m_s: contact.sliding_speed_m_s,
+                    mean_root_speed_m_s: contact.sliding_speed_m_s,
+                    deflection_rate_m_s: T::ZERO,
+                    last_step_s: T::ZERO,
                 })
             }
         }
