@@ -106,7 +106,6 @@ impl TorqueState {
 
 #[cfg(test)]
 mod tests {
-    use super::super::settings::ControlSettings;
     use super::*;
 
     const TICK_S: f32 = 1e-4;
