@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod demo;
 pub mod diagnose;
 pub mod files;
 pub mod fit;
@@ -10,4 +11,6 @@ pub mod link;
 pub mod lockstep;
 pub mod plant;
 pub mod predict;
+pub mod report;
+pub mod studies;
 pub mod summary;

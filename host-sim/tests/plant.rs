@@ -235,15 +235,15 @@ fn edges_of_each_period_lead_from_count_to_count() {
     for k in 0..8000u32 {
         let turn = if k < 5000 { 4000 } else { 300 };
         let output = plant.step(&PlantInput { dac: [ZERO + 500, turn], drive_enable: [true; 2] });
-        for motor in 0..2 {
+        for (motor, count) in counts.iter_mut().enumerate() {
             plant.edges(motor, &mut edges);
             for edge in &edges {
-                assert_eq!((edge.count - counts[motor]).abs(), 1);
+                assert_eq!((edge.count - *count).abs(), 1);
                 assert!((0.0..=PERIOD_S * (1.0 + 1e-12)).contains(&edge.offset_s));
-                counts[motor] = edge.count;
+                *count = edge.count;
             }
             assert!(edges.windows(2).all(|w| w[0].offset_s <= w[1].offset_s));
-            assert_eq!(counts[motor] as u32, output.counts[motor]);
+            assert_eq!(*count as u32, output.counts[motor]);
             seen += edges.len();
         }
     }

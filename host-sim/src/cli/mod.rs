@@ -4,6 +4,7 @@
 //! and one line in [`Command`] here.
 
 pub mod common;
+mod demo;
 mod monitor;
 mod port;
 mod predict;
@@ -58,6 +59,7 @@ macro_rules! commands {
 }
 
 commands! {
+    Demo(demo::Demo),
     Predict(predict::Predict),
     Simulate(simulate::Simulate),
     Record(record::RecordArgs),

@@ -3,15 +3,24 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use model_core::error::ParameterError;
+use model_core::friction::series::SeriesParameters;
+
 use super::common::SetArgs;
 use super::progress::Progress;
-use crate::files::experiment_file::ExperimentFile;
+use crate::demo::ClosedLoop;
+use crate::files::experiment_file::{ExperimentFile, Study};
+use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
-use crate::lockstep::{self, Setup};
-use crate::summary::{RunFacts, summarise};
+use crate::lockstep::Setup;
+use crate::plant::{ElementParameters, PERIOD_S};
+use crate::report::{Block, Chart, Page};
+use crate::studies::contenders::rubber_of;
+use crate::studies::{patch_crossing, speed_sweep};
+use crate::summary::{RunFacts, Summary};
 
 /// Run an experiment in closed loop on the PC: the firmware's control core, the plant behind it
 #[derive(clap::Args, Debug)]
@@ -56,22 +65,77 @@ impl Simulate {
         };
         let mut output = OutputDir::new(&self.out)?;
         let started = Instant::now();
-        let setup = Setup::from_files(&experiment, &rig, &model, &observer)?;
-        let mut progress = Progress::new(&experiment.name, u64::from(setup.experiment.duration_ticks));
-        let recording = lockstep::run(&setup, |done, _| progress.set(done as u64))?;
-        let facts = RunFacts {
-            wall_s: started.elapsed().as_secs_f64(),
-            simulated_s: recording.time_s(recording.frames.len()),
-            control_ticks: recording.control_ticks,
-            deadline_misses: recording.deadline_misses,
-        };
-        let counts = setup.plant.counts_per_rev;
-        let summary = summarise(&experiment, &recording.signals(counts), facts)?;
-        output.write_log(&recording.log(10_000 / experiment.log_rate_hz as usize, counts))?;
-        output.write_json("summary.json", &summary)?;
-        if let Some(fault) = recording.fault {
-            eprintln!("rig: {}: stopped after {} s: {fault}", experiment.name, facts.simulated_s);
+        match &experiment.study {
+            Study::ClosedLoop { .. } => closed_loop(&experiment, &rig, &model, &observer, &mut output)?,
+            Study::PatchCrossing(slip) => {
+                let crossing = patch_crossing::run(slip, &rubber(&model)?).map_err(|e| named(e, &model))?;
+                study(&experiment, &crossing.log(), crossing.chart(), started, &mut output)?;
+            }
+            Study::SpeedSweep(sweep) => {
+                let sweep = speed_sweep::run(sweep, &rubber(&model)?).map_err(|e| named(e, &model))?;
+                study(&experiment, &sweep.log(), sweep.chart(), started, &mut output)?;
+            }
         }
         output.finish()
     }
+}
+
+fn closed_loop(
+    experiment: &ExperimentFile,
+    rig: &RigFile,
+    model: &ModelFile,
+    observer: &ModelFile,
+    output: &mut OutputDir,
+) -> Result<(), InputError> {
+    let setup = Setup::from_files(experiment, rig, model, observer)?;
+    let mut progress = Progress::new(&experiment.name, u64::from(setup.experiment.duration_ticks));
+    let run = ClosedLoop::run(experiment, &setup, |done, _| progress.set(done as u64))?;
+    drop(progress);
+    let every = (1.0 / PERIOD_S).round() as usize / experiment.log_rate_hz as usize;
+    let mut log = run.recording.log(every, setup.plant.counts_per_rev);
+    let mut note = |key: &str, value: String| log.metadata.push((key.into(), value));
+    note("experiment", experiment.name.clone());
+    note("elements", model.kind.name().into());
+    note("seed", setup.seed.to_string());
+    if let Some(fault) = run.recording.fault {
+        note("fault", fault.to_string());
+        let ended = run.summary.run.simulated_s;
+        eprintln!("rig: {}: stopped after {ended} s: {fault}", experiment.name);
+    }
+    output.write_log(&log)?;
+    output.write_json("summary.json", &run.summary)?;
+    output.write("report.html", run.page().to_html())
+}
+
+fn study(
+    experiment: &ExperimentFile,
+    log: &Log,
+    chart: Chart,
+    started: Instant,
+    output: &mut OutputDir,
+) -> Result<(), InputError> {
+    let run = RunFacts { wall_s: started.elapsed().as_secs_f64(), ..RunFacts::default() };
+    output.write("curves.csv", log.to_csv())?;
+    output.write_json(
+        "summary.json",
+        &Summary { experiment: experiment.name.clone(), run, ..Summary::default() },
+    )?;
+    let lead = chart.caption.clone();
+    let page = Page { title: experiment.title.clone(), lead, blocks: vec![Block::Chart(chart)] };
+    output.write("report.html", page.to_html())
+}
+
+/// Block and bristles, which these studies compare.
+fn rubber(model: &ModelFile) -> Result<SeriesParameters<f64>, InputError> {
+    rubber_of(&ElementParameters::from_file(model)).ok_or_else(|| {
+        InputError::new("this study needs block and bristles")
+            .file(model.source.as_str())
+            .key("kind")
+            .value(model.kind.name())
+            .allowed("series")
+    })
+}
+
+fn named(error: ParameterError, model: &ModelFile) -> InputError {
+    InputError::from(error).file(model.source.as_str())
 }

@@ -171,7 +171,7 @@ pub fn run(setup: &Setup, mut progress: impl FnMut(usize, usize)) -> Result<Reco
             break;
         }
         recording.frames.push(frame);
-        if recording.frames.len() % PROGRESS_TICKS == 0 {
+        if recording.frames.len().is_multiple_of(PROGRESS_TICKS) {
             progress(recording.frames.len(), total);
         }
     }

@@ -35,12 +35,15 @@ pub fn control_settings(rig: &RigFile, observer: &ModelFile) -> ControlSettings 
     settings.m1_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
     settings.m2_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
     settings.observer.bridge_lowpass_hz = rig.friction_bridge.lowpass_hz.unwrap_or(0.0) as f32;
-    settings.observer.model = single_precision(&ElementParameters::from_file(observer));
+    if let Some(model) = single_precision(&ElementParameters::from_file(observer)) {
+        settings.observer.model = model;
+    }
     settings
 }
 
 #[allow(clippy::cast_possible_truncation)]
-fn single_precision(p: &ElementParameters) -> ModelParameters {
+/// The observer's parameters; it knows no patch, which no model file can name either.
+fn single_precision(p: &ElementParameters) -> Option<ModelParameters> {
     let lugre = |p: &LugreParameters<f64>| LugreParameters {
         sigma0_n_per_m: p.sigma0_n_per_m as f32,
         sigma1_n_s_per_m: p.sigma1_n_s_per_m as f32,
@@ -53,7 +56,7 @@ fn single_precision(p: &ElementParameters) -> ModelParameters {
             theta: p.stribeck.theta as f32,
         },
     };
-    match p {
+    Some(match p {
         ElementParameters::Brush(p) => ModelParameters::Brush(BrushParameters {
             c_n_per_m: p.c_n_per_m as f32,
             mu_s: p.mu_s as f32,
@@ -66,5 +69,6 @@ fn single_precision(p: &ElementParameters) -> ModelParameters {
             c_u_n_s_per_m: p.c_u_n_s_per_m as f32,
             bristles: lugre(&p.bristles),
         }),
-    }
+        ElementParameters::LugrePatch(_) => return None,
+    })
 }

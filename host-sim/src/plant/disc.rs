@@ -14,6 +14,7 @@
 //! (C/ω₀ = 15 N·m·s), enters each half step by a linearised trapezoidal rule.
 
 use super::parameters::{BearingParameters, ShaftParameters};
+use model_core::real::Real;
 
 /// Bearing friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,10 +38,17 @@ impl Bearing {
     pub(crate) fn torque_and_slope(&self, speed_rad_s: f64) -> (f64, f64) {
         let x = speed_rad_s * self.inverse_smooth_s;
         // Beyond 20 the nearest f64 to tanh is ±1.
-        let t = if x.abs() > 20.0 { 1.0f64.copysign(x) } else { x.tanh() };
+        let t = if x.abs() > 20.0 { 1.0f64.copysign(x) } else { tanh(x) };
         let slope = self.coulomb_nm * self.inverse_smooth_s * (1.0 - t * t) + self.viscous_nm_s;
         (self.coulomb_nm * t + self.viscous_nm_s * speed_rad_s, slope)
     }
+}
+
+/// By the `libm` of the models, so that a run gives the same bytes on every machine.
+#[inline]
+fn tanh(x: f64) -> f64 {
+    let e = Real::exp_m1(2.0 * x);
+    e / (e + 2.0)
 }
 
 /// Angles and speeds of disc and motor; equal where the shaft is rigid.

@@ -6,9 +6,10 @@
 use model_core::error::ParameterError;
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
+use model_core::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
 use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::StribeckParameters;
-use model_core::friction::{Contact, FrictionModel, FrictionState};
+use model_core::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
 
 /// Friction parameters of all elements together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +22,9 @@ pub enum ElementParameters {
     ModifiedLugre(LugreParameters<f64>),
     /// Rubber block in series with LuGre bristles.
     Series(SeriesParameters<f64>),
+    /// LuGre tyre patch, eq. 15, on elements that slide but do not roll: without transport all points of the patch
+    /// do the same, and what is left of the difference to LuGre is that stiffness grows with the load.
+    LugrePatch(PatchParameters<f64>),
 }
 
 impl Default for ElementParameters {
@@ -48,6 +52,7 @@ impl ElementParameters {
             Self::Lugre(_) => "lugre",
             Self::ModifiedLugre(_) => "modified_lugre",
             Self::Series(_) => "series",
+            Self::LugrePatch(_) => "lugre_patch",
         }
     }
 
@@ -68,6 +73,8 @@ impl ElementParameters {
                 c_u_n_s_per_m: p.c_u_n_s_per_m * share,
                 bristles: lugre(&p.bristles),
             }),
+            // Stiffness per unit load is the same for each part of the load.
+            Self::LugrePatch(p) => Self::LugrePatch(*p),
         }
     }
 
@@ -75,13 +82,14 @@ impl ElementParameters {
     ///
     /// # Errors
     /// The parameter out of range.
-    pub fn model(&self, step_s: f64) -> Result<FrictionModel<f64>, ParameterError> {
-        match self {
-            Self::Brush(p) => FrictionModel::brush(p, step_s),
-            Self::Lugre(p) => FrictionModel::lugre(p, step_s),
-            Self::ModifiedLugre(p) => FrictionModel::modified_lugre(p, step_s),
-            Self::Series(p) => FrictionModel::series(p, step_s),
-        }
+    pub fn model(&self, step_s: f64) -> Result<ElementModel, ParameterError> {
+        Ok(match self {
+            Self::Brush(p) => ElementModel::Single(FrictionModel::brush(p, step_s)?),
+            Self::Lugre(p) => ElementModel::Single(FrictionModel::lugre(p, step_s)?),
+            Self::ModifiedLugre(p) => ElementModel::Single(FrictionModel::modified_lugre(p, step_s)?),
+            Self::Series(p) => ElementModel::Single(FrictionModel::series(p, step_s)?),
+            Self::LugrePatch(p) => ElementModel::Patch(LugrePatch::new(p, step_s)?),
+        })
     }
 
     /// Stiffness that the disc feels while the elements stick.
@@ -90,6 +98,69 @@ impl ElementParameters {
             Self::Brush(p) => p.c_n_per_m,
             Self::Lugre(p) | Self::ModifiedLugre(p) => p.sigma0_n_per_m,
             Self::Series(p) => p.k_u_n_per_m,
+            Self::LugrePatch(p) => p.sigma0_per_m * LARGE_LOAD_N,
+        }
+    }
+}
+
+/// What the rig presses with at most, about.
+const LARGE_LOAD_N: f64 = 200.0;
+
+/// A friction model, prepared for a step size: one of the core's, or a patch of one point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ElementModel {
+    /// An element of the core.
+    Single(FrictionModel<f64>),
+    /// A patch without transport.
+    Patch(LugrePatch<f64, 1>),
+}
+
+/// State of an [`ElementModel`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ElementState {
+    /// An element of the core.
+    Single(FrictionState<f64>),
+    /// A patch without transport.
+    Patch(PatchState<f64, 1>),
+}
+
+impl ElementModel {
+    /// The undeformed state.
+    #[must_use]
+    pub fn rest(&self) -> ElementState {
+        match self {
+            Self::Single(model) => ElementState::Single(model.rest()),
+            Self::Patch(_) => ElementState::Patch(PatchState::default()),
+        }
+    }
+
+    /// Advances the element by one step. A state of another kind is first replaced by the undeformed one.
+    #[inline]
+    pub fn step(&self, state: &mut ElementState, contact: &Contact<f64>) -> FrictionForce<f64> {
+        match (self, &mut *state) {
+            (Self::Single(model), ElementState::Single(s)) => model.step(s, contact),
+            (Self::Patch(patch), ElementState::Patch(s)) => FrictionForce {
+                force_n: patch.step(s, contact, 0.0),
+                tip_speed_m_s: contact.sliding_speed_m_s,
+            },
+            _ => {
+                *state = self.rest();
+                FrictionForce::default()
+            }
+        }
+    }
+}
+
+impl ElementState {
+    /// Deformation of the block, or of the bristles where there is no block.
+    #[must_use]
+    pub fn deformation_m(&self) -> f64 {
+        match self {
+            Self::Single(FrictionState::Brush(e)) => e.deformation_m,
+            Self::Single(FrictionState::Lugre(e)) => e.deflection_m,
+            Self::Single(FrictionState::ModifiedLugre(e)) => e.deflection_m,
+            Self::Single(FrictionState::Series(e)) => e.deformation_m,
+            Self::Patch(e) => e.deflection_m[0],
         }
     }
 }
@@ -97,7 +168,7 @@ impl ElementParameters {
 /// The elements, prepared for a step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Elements {
-    model: FrictionModel<f64>,
+    model: ElementModel,
     load_shares: [f64; 3],
     equal: bool,
 }
@@ -105,7 +176,7 @@ pub(crate) struct Elements {
 /// State of the elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ElementsState {
-    pub(crate) element: [FrictionState<f64>; 3],
+    pub(crate) element: [ElementState; 3],
     pub(crate) force_n: f64,
     /// Tip speed of the first element, the root's where it has no block.
     pub(crate) tip_speed_m_s: f64,

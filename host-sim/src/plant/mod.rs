@@ -27,7 +27,7 @@ mod press;
 mod step;
 
 pub use analogue::PinVoltages;
-pub use elements::ElementParameters;
+pub use elements::{ElementModel, ElementParameters, ElementState};
 pub use encoder::Edge;
 pub use parameters::PlantParameters;
 
@@ -36,7 +36,6 @@ use disc::Disc;
 use encoder::{Encoder, Sweep};
 use model_core::control::{AdcScan, DAC_ZERO};
 use model_core::error::ParameterError;
-use model_core::friction::FrictionState;
 use noise::Noise;
 use step::{Activity, Grid, State};
 
@@ -213,12 +212,7 @@ impl Plant {
             normal_force_n: s.press.normal_force_n(),
             friction_torque_nm: s.friction_torque_nm,
             bearing_torque_nm: self.disc.bearing().torque_and_slope(s.disc.speed_rad_s).0,
-            deformation_m: match s.elements.element[0] {
-                FrictionState::Brush(e) => e.deformation_m,
-                FrictionState::Lugre(e) => e.deflection_m,
-                FrictionState::ModifiedLugre(e) => e.deflection_m,
-                FrictionState::Series(e) => e.deformation_m,
-            },
+            deformation_m: s.elements.element[0].deformation_m(),
         }
     }
 

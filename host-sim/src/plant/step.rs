@@ -16,6 +16,7 @@ use super::elements::{Elements, ElementsState};
 use super::parameters::PlantParameters;
 use super::press::{Press, PressState};
 use model_core::error::ParameterError;
+use model_core::real::Real;
 
 /// Everything that changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +50,7 @@ impl Grid {
             substeps,
             step_s,
             press: Press::new(p, step_s),
-            m2_half_decay: (-0.5 * step_s / p.m2.lag_s()).exp(),
+            m2_half_decay: Real::exp(-0.5 * step_s / p.m2.lag_s()),
             m2_lag_s: p.m2.lag_s(),
             elements: Elements::new(&p.elements, p.load_shares, step_s)?,
             bridges: [&p.friction_bridge, &p.normal_bridge].map(|b| Bridge::new(b, step_s)),
