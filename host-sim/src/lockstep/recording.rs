@@ -79,37 +79,3 @@ impl Recording {
         log
     }
 }
-
-/// The shortest decimal that names this `f32`, as `f64`: what stands in a log is then as short as what was measured.
-fn widen(value: f32) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return f64::from(value);
-    }
-    let mut buffer = ryu::Buffer::new();
-    buffer.format_finite(value).parse().unwrap_or_else(|_| f64::from(value))
-}
-
-/// Angle of a count, rounded to a thousandth of a count so that it is short in a log.
-#[allow(clippy::cast_precision_loss)]
-fn angle_rad(count: i64, counts_per_rev: u32) -> f64 {
-    let angle = count as f64 * std::f64::consts::TAU / f64::from(counts_per_rev.max(1));
-    (angle * 1e9).round() / 1e9
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn single_precision_numbers_stay_short() {
-        assert_eq!(widen(0.1f32), 0.1);
-        assert_eq!(widen(-88.0f32), -88.0);
-        assert_eq!(widen(0.0), 0.0);
-    }
-
-    #[test]
-    fn a_count_becomes_its_angle() {
-        assert_eq!(angle_rad(48_000, 480_000), 0.628_318_531);
-        assert_eq!(angle_rad(-480_000 * 7, 480_000), -43.982_297_150);
-    }
-}
