@@ -14,12 +14,13 @@
 //! still answers, says so, and its times and speeds are off by as much. When the crystal fails later, the
 //! clock security system traps, and the trap makes safe.
 
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::rcc::{
     self, AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource,
     Sysclk, VoltageScale, mux,
 };
 use embassy_stm32::time::Hertz;
-use embassy_stm32::{Config, interrupt::Priority, pac};
+use embassy_stm32::{Config, pac};
 
 /// Reads of the ready flag before the crystal counts as missing: some 20 ms at the 64 MHz of the start.
 const PATIENCE: u32 = 200_000;
@@ -63,7 +64,7 @@ pub fn config(crystal: bool) -> Config {
     config.rcc.voltage_scale = VoltageScale::Scale0;
     config.rcc.mux.adcsel = mux::Adcsel::PLL2_P;
     config.rcc.ls = LsConfig::off();
-    // The control tick is at P1; every driver's DMA comes after it.
+    // The control tick is at P1; every driver's DMA comes after it, and `yield_to_the_tick` does the rest.
     config.dma_interrupt_priority = Priority::P6;
     config.bdma_interrupt_priority = Priority::P6;
     config.mdma_interrupt_priority = Priority::P6;
@@ -74,6 +75,13 @@ pub fn config(crystal: bool) -> Config {
 #[must_use]
 pub fn crystal_is_used() -> bool {
     pac::RCC.pllckselr().read().pllsrc() == PllSource::HSE
+}
+
+/// Puts every driver's interrupt behind the control tick. Out of reset all have the highest priority.
+pub fn yield_to_the_tick() {
+    for line in [interrupt::TIM3, interrupt::USART3, interrupt::FLASH] {
+        line.set_priority(Priority::P6);
+    }
 }
 
 /// Turns the clock security system on: a crystal that fails traps (NMI) instead of slowing the loop.

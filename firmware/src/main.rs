@@ -22,6 +22,7 @@ async fn main(spawner: Spawner) {
     let crystal = clocks::crystal_present();
     let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
     outputs::start();
+    clocks::yield_to_the_tick();
     enable_core_features();
     if crystal {
         clocks::watch_crystal();

@@ -237,8 +237,7 @@ impl Operator {
     }
 
     async fn erase(&mut self) -> Answer {
-        let mode = tick::mode();
-        if mode != Mode::Disabled.number() && mode != Mode::Fault.number() {
+        if !drives_off() {
             return Answer::Rejected(Rejection::NotDisabled);
         }
         if self.settings.erase().await.is_err() {
@@ -249,6 +248,11 @@ impl Operator {
             Err(error) => out_of_range(&error),
         }
     }
+}
+
+/// The mode cannot change to one with the drives on meanwhile: that takes a command, and commands come here.
+fn drives_off() -> bool {
+    [Mode::Disabled, Mode::Fault].iter().any(|mode| mode.number() == tick::mode())
 }
 
 fn give_back<T: 'static>(cell: &'static Handover<T>, carried: &Result<(), Undone>) {
@@ -292,7 +296,7 @@ fn out_of_range(error: &ParameterError) -> Answer {
 const MOST_STEPS: u32 = 20_000;
 
 fn self_check(case: u8, steps: u32) -> Answer {
-    if tick::mode() != Mode::Disabled.number() {
+    if !drives_off() {
         return Answer::Rejected(Rejection::NotDisabled);
     }
     let case = usize::from(case);

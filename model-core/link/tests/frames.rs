@@ -167,3 +167,35 @@ fn a_telemetry_row_at_1_khz_uses_less_than_two_thirds_of_the_line() {
     let line_bytes_per_s = rig_link::BAUD as usize / 10;
     assert!(3 * bytes_per_s < 2 * line_bytes_per_s, "{bytes_per_s} of {line_bytes_per_s} bytes/s");
 }
+
+/// The wire format is the order and the types of the members: who changes them raises `PROTOCOL_VERSION` and
+/// writes the new bytes here.
+#[test]
+fn the_bytes_of_version_1_stay_as_they_are() {
+    use rig_link::message::PROTOCOL_VERSION;
+    assert_eq!(PROTOCOL_VERSION, 1);
+    let hex = |bytes: std::vec::Vec<u8>| {
+        bytes.iter().map(|byte| format!("{byte:02x}")).collect::<std::string::String>()
+    };
+    let request = |command| hex(frame_of(&Request { id: 300, command }));
+    assert_eq!(request(Command::Hello), "03ac0205941f151d00");
+    assert_eq!(request(Command::SettingSet { key: 200, value: 32790.5 }), "08ac020cc80180160347fc038dbc00");
+    assert_eq!(request(Command::Restart), "08ac021954b77e7900");
+    let row = TelemetryRow {
+        sequence: 7,
+        tick: 70_000,
+        m1_torque_ref_nm: 3.2,
+        m2_count: -480_000,
+        friction_torque_nm: 6.25,
+        mode: 3,
+        limits: 5,
+        sequencer: 2,
+        experiment_tick: 71,
+        cycles: 20_000,
+        ..TelemetryRow::default()
+    };
+    assert_eq!(
+        hex(frame_of(&Message::Telemetry(row))),
+        "0a0107f0a204cdcc4c4001010101010101010101010104ffcb3a0101010101010101010101010103c8400101010101010102030b050247a09c012b4d293400"
+    );
+}

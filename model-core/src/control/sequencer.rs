@@ -227,8 +227,21 @@ fn value_at<M: Copy>(stretches: &[Stretch<M>], index: &mut usize, elapsed: u32) 
 
 impl Sequencer {
     pub(crate) fn load(&mut self, experiment: &PreparedExperiment) {
-        self.experiment.clone_from(experiment);
+        // Segment by segment: a clone would move the whole capacity, several kilobytes, within one tick.
+        let own = &mut self.experiment;
+        own.m1.clear();
+        own.m2.clear();
+        // Both have the capacity of what they take.
+        let _ = own.m1.extend_from_slice(&experiment.m1);
+        let _ = own.m2.extend_from_slice(&experiment.m2);
+        own.duration_ticks = experiment.duration_ticks;
         self.state = SequencerState::Loaded;
+        self.elapsed = 0;
+    }
+
+    /// Forgets what was loaded.
+    pub(crate) fn unload(&mut self) {
+        self.state = SequencerState::Empty;
         self.elapsed = 0;
     }
 

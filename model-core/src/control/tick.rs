@@ -196,7 +196,7 @@ impl ControlState {
     /// Takes a new configuration: everything measured starts afresh, mode, tick and events go on.
     fn adopt(&mut self, config: &ControlConfig) {
         self.measuring = MeasuringState::new(config);
-        self.sequencer = Sequencer::default();
+        self.sequencer.unload();
         self.tare = TareState::default();
         self.observer = config.observer.fresh();
     }
