@@ -144,7 +144,9 @@ fn rich(text: &str) -> String {
         let at = |i: usize| letters.get(i).copied().unwrap_or(' ');
         let single =
             at(k) == '_' && at(k + 1).is_alphanumeric() && !at(k + 2).is_alphanumeric() && at(k + 2) != '_';
-        let symbol = k > 0 && at(k - 1).is_alphabetic() && (k < 2 || !at(k - 2).is_alphanumeric());
+        let symbol = k > 0
+            && at(k - 1).is_alphabetic()
+            && (k < 2 || !(at(k - 2).is_alphanumeric() || at(k - 2) == '_'));
         if single && symbol {
             let _ = write!(out, "<sub>{}</sub>", at(k + 1));
             k += 2;

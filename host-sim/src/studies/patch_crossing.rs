@@ -195,11 +195,17 @@ mod tests {
         assert_eq!(crossing.profiles.len(), 4);
         let steady = 88.0 * (0.5 + 0.7 * (-(0.06f64 / 0.5).sqrt()).exp()) / 3e4;
         for p in &crossing.profiles {
-            let end = p.deformation_m[POINTS - 1];
-            assert!((end / steady - 1.0).abs() < 5e-3, "{}: {end} against {steady}", p.name);
+            let end = p.deformation_m[POINTS - 1] / steady;
             match p.role {
-                Role::Brush | Role::Series => assert!(p.overshoot() > 0.01, "{}: {}", p.name, p.overshoot()),
-                _ => assert!(p.deformation_m.windows(2).all(|w| w[1] >= w[0] - 1e-12), "{}", p.name),
+                Role::Brush | Role::Series => {
+                    assert!(p.overshoot() > 0.01, "{}: {}", p.name, p.overshoot());
+                    assert!((end - 1.0).abs() < 1e-3, "{} ends at {end} of its steady value", p.name);
+                }
+                _ => {
+                    assert!(p.deformation_m.windows(2).all(|w| w[1] >= w[0] - 1e-12), "{}", p.name);
+                    // 7.5 mm of sliding are 2.6 times the steady deformation: 1 − e^{−2.6} of it.
+                    assert!(end > 0.9 && end <= 1.0, "{} ends at {end} of its steady value", p.name);
+                }
             }
         }
     }

@@ -51,8 +51,8 @@ pub fn run(sweep: &SpeedSweep, rubber: &SeriesParameters<f64>) -> Result<Sweep, 
     };
     for v in &out.speed_m_s {
         let models = five(rubber, *v, load)?;
-        // Six times the way on which the block winds up, and time for the block to relax.
-        let duration_s = 6.0 * load * curve.largest() / rubber.k_u_n_per_m / v
+        // Of LuGre's way to its steady value e^{−14} is left; and time for the block to relax.
+        let duration_s = 14.0 * load * curve.largest() / rubber.k_u_n_per_m / v
             + 20.0 * rubber.c_u_n_s_per_m / rubber.k_u_n_per_m;
         let steps = 20_000;
         let step_s = duration_s / f64::from(steps);
@@ -147,7 +147,7 @@ mod tests {
         let sweep = SpeedSweep { from_m_s: 1e-2, to_m_s: 2.0, points: 12, normal_force_n: 88.0 };
         let s = run(&sweep, &rubber).unwrap();
         for k in 0..12 {
-            assert!((s.lugre[k] / s.curve[k] - 1.0).abs() < 1e-6, "LuGre at {}", s.speed_m_s[k]);
+            assert!((s.lugre[k] / s.curve[k] - 1.0).abs() < 2e-6, "LuGre at {}", s.speed_m_s[k]);
             if s.speed_m_s[k] > s.stick_slip_below_m_s().unwrap_or(0.0) {
                 assert!((s.series[k][0] / s.curve[k] - 1.0).abs() < 2e-3, "series at {}", s.speed_m_s[k]);
             }
