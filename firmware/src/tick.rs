@@ -234,7 +234,15 @@ impl Tick {
     fn carry_out(&mut self) {
         let Some(order) = self.orders.dequeue() else { return };
         let carried = match order {
-            Order::Core(command) => apply(&mut self.config, &mut self.state, command),
+            Order::Core(command) => {
+                let starts = matches!(command, Command::Start);
+                let carried = apply(&mut self.config, &mut self.state, command);
+                if starts && carried.is_ok() && self.every_ticks != 0 {
+                    // Rows count from the experiment's first tick, so that its log begins at 0.
+                    self.until_row = 1;
+                }
+                carried
+            }
             Order::Telemetry(every_ticks) => {
                 self.every_ticks = every_ticks;
                 self.until_row = every_ticks;

@@ -141,6 +141,14 @@ fn contact_figures(summary: &mut Summary, friction: &Phase<'_>, normal: &Phase<'
         .and_then(|(a, b)| ratio(a, b));
 }
 
+/// Start of the phase that is looked at; `None` for a study without motors.
+pub fn phase_start_s(experiment: &ExperimentFile) -> Option<f64> {
+    match &experiment.study {
+        Study::ClosedLoop { m1, m2 } => Some(phase_of(m1, m2, experiment.duration_s).0),
+        _ => None,
+    }
+}
+
 /// Start and end of the phase that is looked at.
 fn phase_of(m1: &[Segment], m2: &[Segment], end_s: f64) -> (f64, f64) {
     let value = |segment: &Segment| match segment.course {

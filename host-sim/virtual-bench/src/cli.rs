@@ -31,8 +31,9 @@ Examples:
   cargo virtual-bench --experiment fig20 --out target/bench/fig20
   cargo virtual-bench --experiment fig20 --observer model-extended.toml --out target/bench/extended
 
-An experiment writes log.csv (as the host tool recorded it from the serial link), summary.json and defmt.log
-(the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
+An experiment writes log.csv (as the host tool recorded it from the serial link), capture.csv (two seconds at the full
+10 kHz around the step, read from the firmware's memory afterwards), summary.json (figures at the full rate where the
+capture has it) and defmt.log (the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
 Exit status: 0 on success, 2 for bad input, 1 for everything else."
 )]
 struct Cli {
@@ -149,6 +150,9 @@ fn run_experiment(cli: Cli, name: &str) -> Result<(), BenchError> {
     let summary = summary(&request, &done, &firmware, started.elapsed().as_secs_f64())?;
     output.write_log(&done.csv())?;
     output.write_json("summary.json", &summary)?;
+    if let Some(captured) = &done.captured {
+        output.write("capture.csv", captured.log().to_csv())?;
+    }
     output.write("defmt.log", done.log.lines.join("\n") + "\n")?;
     output.finish()?;
     let complaints = done.complaints();
@@ -169,7 +173,7 @@ fn summary(
         deadline_misses: u64::from(health.deadline_misses).max(done.ticks.late),
     };
     Ok(BenchSummary {
-        summary: summarise(&request.experiment, &done.csv(), facts)?,
+        summary: summarise(&request.experiment, &done.full_rate()?, facts)?,
         instructions_per_tick: MeanAndMax {
             mean: done.ticks.instructions.mean(),
             max: done.ticks.instructions.max,

@@ -8,7 +8,8 @@ use host_sim::link::procedure::Procedure;
 /// Longest time between two looks of a procedure at its clock.
 const LOOK_NS: u64 = 1_000_000;
 
-/// Does `procedure` at the desk, to its end. `watch` sees it after each of its steps.
+/// Does `procedure` at the desk, to its end. `watch` sees it after each of its steps,
+/// and may send requests of its own, whose answers go unread.
 ///
 /// # Errors
 /// The run ended, the procedure cannot go on, or `watch` refused.
@@ -16,15 +17,15 @@ pub fn perform<P: Procedure>(
     desk: &mut Desk,
     client: &mut Client,
     procedure: &mut P,
-    mut watch: impl FnMut(&mut Desk, &mut P) -> Result<(), BenchError>,
+    mut watch: impl FnMut(&mut Desk, &mut Client, &mut P) -> Result<(), BenchError>,
 ) -> Result<P::Outcome, BenchError> {
     loop {
         procedure.step(desk.now_ns() as f64 * 1e-9, client)?;
+        watch(desk, client, procedure)?;
         let outgoing = client.take_outgoing();
         if !outgoing.is_empty() {
             desk.send(&outgoing)?;
         }
-        watch(desk, procedure)?;
         if let Some(outcome) = procedure.outcome() {
             return Ok(outcome);
         }

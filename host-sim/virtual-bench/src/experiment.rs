@@ -6,6 +6,7 @@ use crate::desk::Desk;
 use crate::desk_link::perform;
 use crate::elf::Firmware;
 use crate::error::BenchError;
+use crate::full_rate;
 use crate::meter::Ticks;
 use crate::outside::Action;
 use crate::plant_side::HostPlant;
@@ -15,12 +16,15 @@ use host_sim::files::log::Log;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
 use host_sim::link::ask::Ask;
+use host_sim::link::capture::{Captured, ReadCapture};
 use host_sim::link::client::Client;
 use host_sim::link::run_experiment::{RunExperiment, RunOptions, RunRecord};
 use host_sim::link::{model_upload, rows, words};
 use host_sim::lockstep::control_settings;
 use host_sim::plant::PlantParameters;
+use host_sim::summary::phase_start_s;
 use model_core::control::ControlSettings;
+use rig_link::capture::CaptureTrigger;
 use rig_link::message::Command;
 use rig_link::model::ModelRecord;
 use rig_link::settings;
@@ -29,6 +33,8 @@ use rig_link::settings;
 pub const BOOT_NS: u64 = 300_000_000;
 /// How long the switch stays off before it is turned on.
 const SWITCH_NS: u64 = 20_000_000;
+/// The capture is triggered so long after the step: it then holds 0.1 s before it and 1.9 s after.
+const CAPTURE_AFTER_S: f64 = 0.9;
 /// Control ticks a second.
 const TICK_HZ: u32 = 10_000;
 
@@ -65,6 +71,15 @@ impl Request {
         Ok(HostPlant::new(&parameters, self.experiment.seed)?)
     }
 
+    /// Tick of the experiment at which the capture is triggered: it holds a second on either side.
+    fn capture_tick(&self) -> u32 {
+        let start_s = phase_start_s(&self.experiment).unwrap_or_default();
+        // The cast saturates.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let tick = ((start_s + CAPTURE_AFTER_S) * f64::from(TICK_HZ)) as u32;
+        tick
+    }
+
     /// Requests that make the firmware know the rig and the observer's model.
     fn preparation(&self) -> Result<Vec<Command>, BenchError> {
         let (wanted, own) = (control_settings(&self.rig, &self.observer), ControlSettings::default());
@@ -90,6 +105,8 @@ pub struct Done {
     pub run: RunRecord,
     /// The control ticks while it ran.
     pub ticks: Ticks,
+    /// Two seconds at the full rate around the beginning of the phase the summary looks at; none after a fault.
+    pub captured: Option<Captured>,
     /// The firmware's log.
     pub log: DefmtLog,
     /// The bench's record.
@@ -101,6 +118,22 @@ impl Done {
     #[must_use]
     pub fn csv(&self) -> Log {
         rows::log(&self.run.rows, &self.run.scale, rows::Zero::Experiment)
+    }
+
+    /// The log with the capture's friction and normal force in place of its own where there is one: what the
+    /// summary is taken from, as a peak between two rows of the log would be missed by up to 2 %.
+    ///
+    /// # Errors
+    /// The log lacks a column the summary needs.
+    pub fn full_rate(&self) -> Result<Log, BenchError> {
+        let log = self.csv();
+        match (&self.captured, self.run.rows.first()) {
+            (Some(captured), Some(first)) => {
+                let start_tick = first.tick - u64::from(first.experiment_tick);
+                full_rate::spliced(&log, captured, start_tick, self.run.scale.tick_hz)
+            }
+            _ => Ok(log),
+        }
     }
 
     /// A sentence for everything that must not be in a clean run.
@@ -142,16 +175,16 @@ pub fn run(
 ) -> Result<Done, BenchError> {
     let plant = request.plant()?;
     let outcome = bench::run(firmware, Box::new(plant), |desk| operate(desk, request, progress))?;
-    let Outcome { operator: (run, ticks), record } = outcome;
+    let Outcome { operator: Operated { run, ticks, captured }, record } = outcome;
     let log = defmt_log::decode(&firmware.bytes, &record.log)?;
-    Ok(Done { run, ticks, log, record })
+    Ok(Done { run, ticks, captured, log, record })
 }
 
 fn operate(
     desk: &mut Desk,
     request: &Request,
     mut progress: impl FnMut(u32, u32),
-) -> Result<(RunRecord, Ticks), BenchError> {
+) -> Result<Operated, BenchError> {
     let experiment = request.experiment.for_core(&request.rig)?;
     let total = experiment.duration_ticks;
     let every_ticks = u16::try_from(TICK_HZ / request.experiment.log_rate_hz.max(1)).unwrap_or(u16::MAX);
@@ -159,21 +192,18 @@ fn operate(
     boot(desk)?;
     let preparation = request.preparation()?;
     if !preparation.is_empty() {
-        let answers = perform(desk, &mut client, &mut Ask::new(preparation), |_, _| Ok(()))?;
+        let answers = perform(desk, &mut client, &mut Ask::new(preparation), |_, _, _| Ok(()))?;
         answers.iter().try_for_each(words::accepted)?;
     }
+    client.request(Command::CaptureArm(CaptureTrigger::Command));
+    let mut capture_at = Some(request.capture_tick().min(total));
     let mut procedure = RunExperiment::new(experiment, RunOptions { every_ticks, ..RunOptions::default() });
     let mut ticks = None;
-    let mut switch_on_at = None;
+    let mut switch = ArmSwitch::default();
     let mut measuring = false;
-    let run = perform(desk, &mut client, &mut procedure, |desk, procedure| {
-        if procedure.wants_arm_switch() && switch_on_at.is_none() {
-            desk.act(Action::ArmSwitch(false))?;
-            switch_on_at = Some(desk.now_ns() + SWITCH_NS);
-        }
-        if switch_on_at.is_some_and(|at| desk.now_ns() >= at) {
-            desk.act(Action::ArmSwitch(true))?;
-            switch_on_at = Some(u64::MAX);
+    let run = perform(desk, &mut client, &mut procedure, |desk, client, procedure| {
+        if procedure.wants_arm_switch() {
+            switch.turn(desk)?;
         }
         let done = procedure.progress_ticks();
         if done > 0 && !measuring {
@@ -183,6 +213,10 @@ fn operate(
         if measuring && ticks.is_none() && done + u32::from(every_ticks) >= total {
             ticks = Some(desk.end_measuring()?);
         }
+        if capture_at.is_some_and(|at| done >= at) {
+            capture_at = None;
+            client.request(Command::CaptureTrigger);
+        }
         progress(done, total);
         Ok(())
     })?;
@@ -190,7 +224,44 @@ fn operate(
         Some(ticks) => ticks,
         None => desk.end_measuring()?,
     };
-    Ok((run, ticks))
+    let captured = match run.fault {
+        None => Some(perform(desk, &mut client, &mut ReadCapture::new(None), |_, _, _| Ok(()))?),
+        Some(_) => None,
+    };
+    Ok(Operated { run, ticks, captured })
+}
+
+struct Operated {
+    run: RunRecord,
+    ticks: Ticks,
+    captured: Option<Captured>,
+}
+
+/// The operator's hand on the arm switch: off, a moment later on.
+#[derive(Debug, Default)]
+pub struct ArmSwitch {
+    on_at: Option<u64>,
+    on: bool,
+}
+
+impl ArmSwitch {
+    /// To be called again and again until the rig arms.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn turn(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+        match self.on_at {
+            None => {
+                self.on_at = Some(desk.now_ns() + SWITCH_NS);
+                desk.act(Action::ArmSwitch(false))
+            }
+            Some(at) if desk.now_ns() >= at && !self.on => {
+                self.on = true;
+                desk.act(Action::ArmSwitch(true))
+            }
+            Some(_) => Ok(()),
+        }
+    }
 }
 
 /// Waits until the firmware listens, and looks at its pins.

@@ -11,6 +11,7 @@ pub mod elf;
 pub mod error;
 pub mod experiment;
 pub mod firmware_build;
+mod full_rate;
 pub mod gaps;
 pub mod meter;
 pub mod outside;
