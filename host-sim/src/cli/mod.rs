@@ -5,6 +5,7 @@
 
 pub mod common;
 mod demo;
+mod fit;
 mod monitor;
 mod port;
 mod predict;
@@ -61,6 +62,7 @@ macro_rules! commands {
 commands! {
     Demo(demo::Demo),
     Predict(predict::Predict),
+    Fit(fit::Fit),
     Simulate(simulate::Simulate),
     Record(record::RecordArgs),
     Run(run::Run),

@@ -14,7 +14,7 @@ const NO_INFLUENCE: f64 = 1e-9;
 /// Below this ratio of singular values a direction is lost: changes of 1 % cancel to 1e-7 of the signal.
 const LOST_DIRECTION: f64 = 1e-5;
 /// A parameter belongs to a lost direction if it has at least this share of the largest component.
-const SHARE: f64 = 0.2;
+const SHARE: f64 = 0.05;
 
 /// What a Jacobian says about identifiability.
 #[derive(Debug, Clone, PartialEq)]

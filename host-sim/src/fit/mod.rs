@@ -1,6 +1,7 @@
 //! Identification: parameters from logs, with what is known about their uncertainty.
 
 pub mod bounds;
+pub mod contact;
 pub mod covariance;
 pub mod drive;
 pub mod error;
