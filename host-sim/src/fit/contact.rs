@@ -225,7 +225,7 @@ pub fn identify(
     starts.push((cost(&first), first));
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     starts.truncate(STARTS);
-    let coarse = Options { patience: 12, tolerance: 1e-4, ..Options::default() };
+    let coarse = Options { patience: 2, tolerance: 1e-3, one_sided: true, ..Options::default() };
     let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut refused = None;
     for (_, start) in &starts {
@@ -245,7 +245,7 @@ pub fn identify(
     parameters.iter_mut().zip(&values).for_each(|(parameter, value)| parameter.start = *value);
     let plans =
         plans_for(&with(&values, &parameters).ok_or_else(|| refuse(FitError::NotFinite.to_string()))?)?;
-    let fine = Options { patience: 20, tolerance: 1e-6, ..Options::default() };
+    let fine = Options { patience: 2, tolerance: 1e-5, ..Options::default() };
     let solution = minimise(&parameters, &[], &|values| residuals(values, &parameters, &plans), fine)
         .map_err(|why| refuse(why.to_string()))?;
     let mut fitted =

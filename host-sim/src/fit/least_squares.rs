@@ -35,11 +35,13 @@ pub struct Options {
     pub tolerance: f64,
     /// Largest standard deviation allowed, relative to the typical size of the parameter.
     pub largest_relative_std: f64,
+    /// One-sided differences: half the cost, enough on the way to an optimum.
+    pub one_sided: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { patience: 60, tolerance: 1e-8, largest_relative_std: 1.0 }
+        Self { patience: 60, tolerance: 1e-8, largest_relative_std: 1.0, one_sided: false }
     }
 }
 
@@ -73,6 +75,7 @@ struct Problem<'a> {
     parameters: &'a [Parameter],
     residuals: &'a Residuals<'a>,
     at: DVector<f64>,
+    one_sided: bool,
 }
 
 impl Problem<'_> {
@@ -85,10 +88,13 @@ impl Problem<'_> {
         residuals.iter().all(|r| r.is_finite()).then(|| DVector::from_vec(residuals))
     }
 
-    fn difference(&self, column: usize) -> Option<DVector<f64>> {
+    fn difference(&self, column: usize, here: Option<&DVector<f64>>) -> Option<DVector<f64>> {
         let mut search = self.at.clone();
         search[column] += DIFFERENCE;
         let up = self.evaluate(&search)?;
+        if let Some(here) = here {
+            return Some((up - here) / DIFFERENCE);
+        }
         search[column] -= 2.0 * DIFFERENCE;
         Some((up - self.evaluate(&search)?) / (2.0 * DIFFERENCE))
     }
@@ -113,12 +119,15 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
         let count = self.at.len();
+        let here = if self.one_sided { Some(self.evaluate(&self.at)?) } else { None };
+        let here = here.as_ref();
         let workers = thread::available_parallelism().map_or(1, |n| n.get()).min(count).max(1);
         let shares: Vec<Vec<Option<DVector<f64>>>> = thread::scope(|scope| {
             let running: Vec<_> = (0..workers)
                 .map(|worker| {
-                    scope
-                        .spawn(move || (worker..count).step_by(workers).map(|c| self.difference(c)).collect())
+                    scope.spawn(move || {
+                        (worker..count).step_by(workers).map(|c| self.difference(c, here)).collect()
+                    })
                 })
                 .collect();
             running.into_iter().map(|thread| thread.join().unwrap_or_default()).collect()
@@ -143,7 +152,7 @@ pub fn minimise(
     options: Options,
 ) -> Result<Solution, FitError> {
     let Best { at, starts_agreeing } = best_of_starts(parameters, other_starts, residuals, options)?;
-    finish(&Problem { parameters, residuals, at }, starts_agreeing, options)
+    finish(&Problem { parameters, residuals, at, one_sided: false }, starts_agreeing, options)
 }
 
 /// Minimises like [`minimise`] without examining the result: for parameters that are nuisances, or are
@@ -155,7 +164,7 @@ pub fn search(
     options: Options,
 ) -> Result<Vec<f64>, FitError> {
     let Best { at, .. } = best_of_starts(parameters, other_starts, residuals, options)?;
-    Ok(Problem { parameters, residuals, at: at.clone() }.values(&at))
+    Ok(parameters.iter().zip(at.iter()).map(|(parameter, y)| parameter.from_search(*y)).collect())
 }
 
 struct Best {
@@ -176,7 +185,7 @@ fn best_of_starts(
         check_bounds(parameters, start)?;
         let at =
             DVector::from_iterator(start.len(), parameters.iter().zip(start).map(|(p, x)| p.to_search(*x)));
-        let problem = Problem { parameters, residuals, at };
+        let problem = Problem { parameters, residuals, at, one_sided: options.one_sided };
         let Some(jacobian) = problem.jacobian() else { continue };
         if jacobian.nrows() <= parameters.len() {
             let (samples, needed) = (jacobian.nrows(), parameters.len() + 1);
