@@ -2,9 +2,9 @@
 //! and rows as the firmware's, in simulated time.
 #![allow(clippy::unwrap_used)]
 
-use host_sim::files::experiment_file::ExperimentFile;
-use host_sim::files::model_file::ModelFile;
-use host_sim::files::rig_file::RigFile;
+mod fake_rig;
+
+use fake_rig::{Rig, TICK_S, setup};
 use host_sim::files::signal::Signal;
 use host_sim::input_error::InputError;
 use host_sim::link::ask::Ask;
@@ -14,169 +14,8 @@ use host_sim::link::record::Record;
 use host_sim::link::rows::{self, Zero};
 use host_sim::link::run_experiment::{RunExperiment, RunOptions, RunRecord};
 use host_sim::lockstep::{self, Setup};
-use host_sim::plant::{Plant, PlantInput, PlantOutput};
-use model_core::control::{
-    Command as Core, ControlConfig, ControlState, Fault, Refused, Samples, SequencerState, apply, step,
-};
-use rig_link::frame::{MAX_FRAME, Receiver, encode};
-use rig_link::message::{Answer, Command, Hello, Message, PROTOCOL_VERSION, Rejection, Request};
-use rig_link::program::Upload;
-use rig_link::settings::{SettingState, by_key};
-use rig_link::telemetry::TelemetryRow;
-
-const TICK_S: f64 = 1e-4;
-
-/// Control core and plant behind the link.
-struct Rig {
-    config: ControlConfig,
-    state: ControlState,
-    plant: Plant,
-    seen: PlantOutput,
-    drive: PlantInput,
-    arm_switch: bool,
-    emergency_stop: bool,
-    upload: Upload,
-    every_ticks: u16,
-    until_row: u16,
-    sequence: u32,
-    receiver: Receiver,
-    out: Vec<u8>,
-    hello: Hello,
-    /// Rows it forgets to send.
-    lose: fn(u32) -> bool,
-    /// Answers no more.
-    dead: bool,
-}
-
-fn setup(experiment: &str) -> (ExperimentFile, Setup) {
-    let rig = RigFile::assumed_rig(&[]).unwrap();
-    let model = ModelFile::assumed(&[]).unwrap();
-    let file = ExperimentFile::named_or_read(experiment, &[]).unwrap();
-    let setup = Setup::from_files(&file, &rig, &model, &model).unwrap();
-    (file, setup)
-}
-
-impl Rig {
-    fn new(setup: &Setup) -> Self {
-        let mut plant = Plant::new(&setup.plant, setup.seed).unwrap();
-        let seen = plant.sample();
-        Self {
-            state: ControlState::new(&setup.config),
-            config: setup.config,
-            plant,
-            seen,
-            drive: PlantInput::OFF,
-            arm_switch: false,
-            emergency_stop: false,
-            upload: Upload::default(),
-            every_ticks: 0,
-            until_row: 0,
-            sequence: 0,
-            receiver: Receiver::new(),
-            out: Vec::new(),
-            hello: Hello { protocol: PROTOCOL_VERSION, tick_hz: 10_000, crystal: true, ..Hello::default() },
-            lose: |_| false,
-            dead: false,
-        }
-    }
-
-    fn say(&mut self, message: &Message) {
-        let mut frame = [0; MAX_FRAME];
-        let length = encode(message, &mut frame).unwrap();
-        self.out.extend_from_slice(&frame[..length]);
-    }
-
-    fn core(&mut self, command: Core<'_>) -> Answer {
-        match apply(&mut self.config, &mut self.state, command) {
-            Ok(()) => Answer::Done,
-            Err(refused) => Refused::into(refused),
-        }
-    }
-
-    fn carry_out(&mut self, command: Command) -> Answer {
-        match command {
-            Command::Hello => Answer::Hello(self.hello.clone()),
-            Command::KeepAlive => Answer::Done,
-            Command::KeptMessage => Answer::Kept(None),
-            Command::SettingGet { key } => {
-                let active = by_key(key).unwrap().get(self.config.settings());
-                Answer::Setting(SettingState { key, active, stored: None, default: active })
-            }
-            Command::Telemetry { every_ticks } => {
-                (self.every_ticks, self.until_row, self.sequence) = (every_ticks, every_ticks, 0);
-                Answer::Done
-            }
-            Command::ProgramBegin(header) => {
-                self.upload.begin(header);
-                Answer::Done
-            }
-            Command::ProgramSegment(segment) => {
-                self.upload.push(&segment).unwrap();
-                Answer::Done
-            }
-            Command::ProgramCommit => match self.upload.complete().unwrap().prepare(&self.config) {
-                Ok(prepared) => self.core(Core::LoadExperiment(&prepared)),
-                Err(error) => {
-                    let why = heapless::String::try_from(error.to_string().as_str()).unwrap_or_default();
-                    Answer::Rejected(Rejection::ImpossibleProgram { why })
-                }
-            },
-            Command::Arm => self.core(Core::Arm),
-            Command::Disarm => self.core(Core::Disarm),
-            Command::Start => self.core(Core::Start),
-            Command::Stop => self.core(Core::Stop),
-            _ => Answer::Rejected(Rejection::UnknownCase),
-        }
-    }
-
-    fn tick(&mut self, heard: bool) {
-        let samples = Samples {
-            m1_count: self.seen.counts[0],
-            m2_count: self.seen.counts[1],
-            adc: self.seen.codes,
-            adc_fresh: true,
-            arm_switch: self.arm_switch,
-            emergency_stop: self.emergency_stop,
-            link_heard: heard,
-            ..Samples::default()
-        };
-        let outputs = step(&self.config, &mut self.state, &samples);
-        self.seen = self.plant.step(&self.drive);
-        self.drive = PlantInput { dac: outputs.dac, drive_enable: outputs.drive_enable };
-        while let Some(event) = self.state.pop_event() {
-            self.say(&Message::Event(event.into()));
-        }
-        if self.every_ticks != 0 {
-            let record = &outputs.record;
-            let first = record.sequencer == SequencerState::Running && record.experiment_tick == 1;
-            self.until_row = if first { 0 } else { self.until_row - 1 };
-            if self.until_row == 0 {
-                self.until_row = self.every_ticks;
-                if !(self.lose)(self.sequence) {
-                    self.say(&Message::Telemetry(TelemetryRow::new(record, self.sequence, 0)));
-                }
-                self.sequence += 1;
-            }
-        }
-    }
-
-    /// A millisecond of rig time: what came in is carried out, what goes out is returned.
-    fn millisecond(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let mut heard = false;
-        for byte in bytes {
-            if let Some(Ok(Request { id, command })) = self.receiver.push::<Request>(*byte) {
-                heard = true;
-                let answer = self.carry_out(command);
-                self.say(&Message::Answer { id, answer });
-            }
-        }
-        for tick in 0..10 {
-            self.tick(heard && tick == 0);
-        }
-        let out = std::mem::take(&mut self.out);
-        if self.dead { Vec::new() } else { out }
-    }
-}
+use model_core::control::Fault;
+use rig_link::message::{Command, PROTOCOL_VERSION};
 
 /// Does a procedure with the rig; `each` may meddle, once a millisecond.
 fn perform<P: Procedure>(
