@@ -1,7 +1,7 @@
 //! The command line of `rig`: one file a subcommand.
 //!
 //! A subcommand is a `clap::Args` struct with `fn run(self) -> Result<(), InputError>` in its own file
-//! and one line in [`Command`] here.
+//! and one line in `Command` here.
 
 pub mod common;
 mod demo;

@@ -5,7 +5,7 @@
 //! kick, one step of the friction model at the speed of the middle, half a kick. That is second order in the
 //! coupling and asks for one friction evaluation a sub-step. The fastest coupled motion of the assumed rig (block
 //! against disc) is 73 rad/s, so one sub-step of 100 µs is enough where nothing happens; load steps, breaking
-//! loose and sticking again get sixteen, and stiffer parts get more by themselves ([`step`]).
+//! loose and sticking again get sixteen, and stiffer parts get more by themselves (`step`).
 //!
 //! What the controller sees ([`PlantOutput`]) is quantised and noisy; the truth stands beside it. The period of
 //! delay between the controller's output and the drives belongs to the caller: drive the plant over a period
