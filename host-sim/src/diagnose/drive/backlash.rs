@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::conditioned::DriveLog;
 use super::effect::{DriveEffect, Known, Prepared, Regressor, Seen, Slow};
-use super::shaft::{Shaft, Spring, typical_acceleration};
+use super::shaft::{Shaft, Spring, add_motor_share, disc_per_inertia, typical_acceleration};
 use super::units::Units;
 use crate::fit::bounds::Parameter;
 
@@ -17,7 +17,7 @@ use crate::fit::bounds::Parameter;
 pub struct Backlash;
 
 struct DeadZone {
-    shapes: [Parameter; 5],
+    shapes: Vec<Parameter>,
     starts: Vec<Vec<f64>>,
     slow: Slow,
     typical: f64,
@@ -47,6 +47,7 @@ impl Prepared for DeadZone {
             damping: 2.0 * shape[3] * slope.sqrt(),
             coulomb: self.slow.coulomb * per_inertia,
             viscous: self.slow.viscous * per_inertia,
+            per_inertia: disc_per_inertia(shape.get(5), self.slow.inertia),
         };
         let name = Units::of(seen.log.motion).inertia("disc_inertia");
         vec![Regressor { name, values: shaft.torque_per_inertia(seen.log) }]
@@ -70,7 +71,7 @@ impl DriveEffect for Backlash {
         let typical = typical_acceleration(logs);
         let depth_of = |hz: f64| typical / (2.0 * std::f64::consts::PI * hz).powi(2);
         let (deep, shallow) = (depth_of(5.0), depth_of(3.0 * band));
-        let shapes = [
+        let mut shapes = vec![
             Parameter::logarithmic(&units.position("gap"), (low * high).sqrt(), low, high),
             Parameter::logarithmic(&units.position("flank_depth"), (deep * shallow).sqrt(), shallow, deep),
             Parameter::linear("flank_exponent", 1.2, 1.0, 2.5),
@@ -88,6 +89,7 @@ impl DriveEffect for Backlash {
                 }
             }
         }
+        add_motor_share(logs, &mut shapes, &mut starts);
         Ok(Arc::new(DeadZone { shapes, starts, slow: known.slow, typical }))
     }
 }

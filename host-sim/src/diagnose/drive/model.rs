@@ -235,11 +235,20 @@ impl Model<'_> {
         let mut values = solve_normal(&normal, &right, &held)?;
         let beyond: Vec<usize> =
             (0..count).filter(|&i| is_timing(&names[i]) && values[i].abs() > TIMING_S).collect();
-        if !beyond.is_empty() {
+        // Friction that rises from standstill is not this effect.
+        let wrong: Vec<usize> =
+            (0..count).filter(|&i| is_static_excess(&names[i]) && values[i] < 0.0).collect();
+        if !beyond.is_empty() || !wrong.is_empty() {
             for i in beyond {
                 held[i] = Some(values[i].clamp(-TIMING_S, TIMING_S));
             }
+            for i in wrong {
+                held[i] = Some(0.0);
+            }
             values = solve_normal(&normal, &right, &held)?;
+        }
+        if !energy.is_finite() || values.iter().any(|x| !x.is_finite()) {
+            return None;
         }
         let explained = 2.0 * right.dot(&values) - (&normal * &values).dot(&values);
         Some(Sizes { values: values.as_slice().to_vec(), sum_of_squares: (energy - explained).max(0.0) })
@@ -249,6 +258,10 @@ impl Model<'_> {
 /// Whether a column's coefficient is a time between channels.
 pub fn is_timing(name: &ColumnName) -> bool {
     name.effect.is_none() && name.name.ends_with("_timing_s")
+}
+
+fn is_static_excess(name: &ColumnName) -> bool {
+    name.effect == Some("bearing_stribeck") && name.name.starts_with("static_excess")
 }
 
 /// Names of inertia, viscous and Coulomb friction.

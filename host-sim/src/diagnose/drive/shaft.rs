@@ -3,6 +3,7 @@
 //!
 //! Per unit of the disc's inertia: θ̈₂ = w − f(θ̇₂), w = s(θ₁ − θ₂) + b (θ̇₁ − θ̇₂). The motor then has to
 //! deliver J₁ θ̈₁ + J₂ w, so w is a regressor. f is the disc's share of friction per inertia.
+//! In a contact log the friction torque on the disc is a known load on its side.
 //! A shaft alone: s = ω² x (1 + κ (x/x₀)²), x₀ the twist at the typical acceleration. With a gap β:
 //! s = s₀ (d/x₀)ⁿ outside of it, d = |x| − β/2; n = 1 is a sharp flank, n = 1.5 a Hertzian contact, more
 //! a rough or lubricated one; the damper acts in contact and never pulls.
@@ -12,6 +13,7 @@
 //! Schröder, Elektrische Antriebe; for the dead zone Nordin and Gutman (2002), Hunt and Crossley (1975).
 
 use super::conditioned::DriveLog;
+use crate::fit::bounds::Parameter;
 
 /// Elastic part of the coupling, per inertia of the disc.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +49,8 @@ pub struct Shaft {
     pub coulomb: f64,
     /// Viscous friction of the disc over its inertia.
     pub viscous: f64,
+    /// 1 over the disc's inertia, for the friction torque that a contact log measures on it.
+    pub per_inertia: f64,
 }
 
 /// Steps are at most this share of 1/ω.
@@ -55,7 +59,9 @@ const STEP_SHARE: f64 = 0.25;
 impl Spring {
     fn pull(&self, strain: f64) -> f64 {
         match *self {
-            Self::Shaft { stiffness, hardening } => stiffness * strain * (1.0 + hardening * strain * strain),
+            Self::Shaft { stiffness, hardening } => {
+                stiffness * strain * (1.0 + hardening * strain * strain).max(0.2)
+            }
             Self::Flanks { half_gap, factor, exponent, .. } => {
                 let depth = strain.abs() - half_gap;
                 if depth <= 0.0 { 0.0 } else { (factor * depth.powf(exponent)).copysign(strain) }
@@ -76,7 +82,7 @@ impl Spring {
 }
 
 impl Shaft {
-    /// The shaft's torque over the disc's inertia, at each sample.
+    /// The shaft's torque less the measured friction over the disc's inertia, at each sample.
     pub fn torque_per_inertia(&self, log: &DriveLog) -> Vec<f64> {
         let step_s = log.record.step_s;
         let rate = self.spring.steepest().sqrt().max(self.damping);
@@ -86,6 +92,7 @@ impl Shaft {
         let (Some(&first), Some(&speed)) = (log.position.first(), log.speed.first()) else {
             return Vec::new();
         };
+        let rubbing = log.contact.as_ref().map(|contact| contact.friction.as_slice());
         let (mut x, mut v) = (first, speed);
         let mut torque = vec![0.0; log.len()];
         for (i, torque) in torque.iter_mut().enumerate().skip(1) {
@@ -93,6 +100,8 @@ impl Shaft {
             let (s0, s1) = (log.speed[i - 1], log.speed[i]);
             // Cubic through both ends' positions and speeds.
             let (a, b) = (step_s * s0 - (p1 - p0), (p1 - p0) - step_s * s1);
+            let load =
+                rubbing.map_or(0.0, |friction| self.per_inertia * 0.5 * (friction[i - 1] + friction[i]));
             let mut w = 0.0;
             for k in 1..=splits as usize {
                 let t = k as f64 / splits;
@@ -104,12 +113,13 @@ impl Shaft {
                     w = 0.0;
                 }
                 // Coulomb friction cannot turn the disc around within a step.
-                let free = v + h * (w - self.viscous * v);
+                let free = v + h * (w - load - self.viscous * v);
                 let stop = h * self.coulomb;
                 v = if free.abs() <= stop { 0.0 } else { free - stop.copysign(free) };
                 x += h * v;
             }
-            *torque = w;
+            // The measured friction is taken off the effort elsewhere.
+            *torque = w - rubbing.map_or(0.0, |friction| self.per_inertia * friction[i]);
         }
         torque
     }
@@ -125,4 +135,17 @@ pub fn typical_acceleration(logs: &[&DriveLog]) -> f64 {
         }
     }
     (sum / f64::max(count, 1.0)).sqrt().max(1e-12)
+}
+
+/// In contact logs the friction acts on the disc alone, so the disc's share of the inertia matters.
+pub fn add_motor_share(logs: &[&DriveLog], shapes: &mut Vec<Parameter>, starts: &mut [Vec<f64>]) {
+    if logs.iter().any(|log| log.contact.is_some()) {
+        shapes.push(Parameter::linear("motor_inertia_share", 0.4, 0.05, 0.95));
+        starts.iter_mut().for_each(|start| start.push(0.4));
+    }
+}
+
+/// 1 over the disc's inertia for the motor's share of the whole.
+pub fn disc_per_inertia(motor_share: Option<&f64>, inertia: f64) -> f64 {
+    motor_share.map_or(0.0, |share| 1.0 / ((1.0 - share) * inertia))
 }

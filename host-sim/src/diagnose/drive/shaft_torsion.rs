@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::conditioned::DriveLog;
 use super::effect::{DriveEffect, Known, Prepared, Regressor, Seen};
-use super::shaft::{Shaft, Spring, typical_acceleration};
+use super::shaft::{Shaft, Spring, add_motor_share, disc_per_inertia, typical_acceleration};
 use super::units::Units;
 use crate::fit::bounds::Parameter;
 
@@ -17,11 +17,12 @@ use crate::fit::bounds::Parameter;
 pub struct ShaftTorsion;
 
 struct TwoMasses {
-    shapes: [Parameter; 4],
+    shapes: Vec<Parameter>,
     starts: Vec<Vec<f64>>,
     coulomb: f64,
     viscous: f64,
     typical: f64,
+    inertia: f64,
 }
 
 impl Prepared for TwoMasses {
@@ -41,6 +42,7 @@ impl Prepared for TwoMasses {
             damping: 2.0 * shape[1] * omega,
             coulomb: shape[2] * self.coulomb,
             viscous: shape[2] * self.viscous,
+            per_inertia: disc_per_inertia(shape.get(4), self.inertia),
         };
         let name = Units::of(seen.log.motion).inertia("disc_inertia");
         vec![Regressor { name, values: shaft.torque_per_inertia(seen.log) }]
@@ -57,15 +59,16 @@ impl DriveEffect for ShaftTorsion {
         let (low, high) = (3.0, 1.6 * band);
         let steps = 16;
         let at = |i: i32| low * (high / low).powf(f64::from(i) / f64::from(steps - 1));
-        let shapes = [
+        let mut shapes = vec![
             Parameter::logarithmic("natural_frequency_hz", 0.5 * band, low, high),
             Parameter::logarithmic("damping_ratio", 0.03, 2e-3, 0.7),
             // Friction of the disc in multiples of the whole friction over the whole inertia.
             Parameter::linear("disc_friction_share", 0.3, 0.0, 3.0),
             Parameter::linear("hardening", 0.0, -0.1, 0.5),
         ];
-        let starts =
+        let mut starts: Vec<Vec<f64>> =
             (0..steps).flat_map(|i| [0.02, 0.15].map(|damping| vec![at(i), damping, 0.3, 0.0])).collect();
+        add_motor_share(logs, &mut shapes, &mut starts);
         let per_inertia = |value: f64| (value / known.slow.inertia).max(0.0);
         Ok(Arc::new(TwoMasses {
             shapes,
@@ -73,6 +76,7 @@ impl DriveEffect for ShaftTorsion {
             coulomb: per_inertia(known.slow.coulomb),
             viscous: per_inertia(known.slow.viscous),
             typical: typical_acceleration(logs),
+            inertia: known.slow.inertia,
         }))
     }
 }
