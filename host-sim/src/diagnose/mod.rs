@@ -5,8 +5,11 @@
 //! compared is the same for all of them.
 
 pub mod analysis;
+pub mod contact;
 pub mod drive;
+pub mod effects;
 pub mod noise;
 pub mod record;
 pub mod saturation;
+pub mod search;
 pub mod smooth;

@@ -66,17 +66,35 @@ fn detrended_variance(window: &[f64]) -> f64 {
     left.iter().map(|x| x * x).sum::<f64>() / (count - 3) as f64
 }
 
+/// Reproducible white noise of variance 1, near Gaussian: the sum of twelve uniform numbers of a linear
+/// congruential generator (Knuth's MMIX constants).
+#[derive(Debug, Clone)]
+pub struct White(u64);
+
+impl White {
+    /// A sequence of its own for each seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x5851_F42D_4C95_7F2D)
+    }
+
+    /// The next value.
+    #[allow(clippy::should_implement_trait, reason = "it never ends")]
+    pub fn next(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
 
-    /// Reproducible white noise, near Gaussian (sum of twelve uniform numbers), variance 1.
-    pub(in super::super) fn white(count: usize, mut seed: u64) -> Vec<f64> {
-        let mut uniform = move || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..count).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+    pub(in super::super) fn white(count: usize, seed: u64) -> Vec<f64> {
+        let mut noise = White::new(seed);
+        (0..count).map(|_| noise.next()).collect()
     }
 
     #[test]

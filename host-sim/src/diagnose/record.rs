@@ -36,6 +36,15 @@ impl Measured {
     }
 }
 
+/// What the sliding speed is taken from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Motion {
+    /// The slope of the angle, whose noise has this standard deviation, rad.
+    Angle(f64),
+    /// A speed column and the standard deviation of its noise, rad/s.
+    Speed(Vec<f64>, f64),
+}
+
 /// A contact log, ready for analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
@@ -49,10 +58,12 @@ pub struct Record {
     pub step_s: f64,
     /// Disc angle, unwrapped, rad.
     pub angle_rad: Vec<f64>,
-    /// Disc speed, smoothed, rad/s, with the noise left in it.
-    pub speed_rad_s: smooth::Smoothed,
-    /// Normal force, smoothed and taken ahead by the bridge's delay, N.
-    pub load_n: smooth::Smoothed,
+    /// Standard deviation of the angle's noise, rad.
+    pub angle_noise_rad: f64,
+    /// What the speed is taken from.
+    pub motion: Motion,
+    /// How late the normal bridge is, s.
+    pub normal_late_s: f64,
     /// Friction torque.
     pub friction_nm: Measured,
     /// Normal force.
@@ -89,10 +100,10 @@ impl Record {
             (noise::standard_deviation(&angle_rad), noise::standard_deviation(&speed));
         let has_angle = log.signal(Signal::M2Angle).is_some();
         let slope_noise = angle_noise / (std::f64::consts::SQRT_2 * step_s);
-        let speed_rad_s = if has_angle && slope_noise < 2.0 * speed_noise {
-            smooth::slope(&time_s, &angle_rad, angle_noise)
+        let motion = if has_angle && slope_noise < 2.0 * speed_noise {
+            Motion::Angle(angle_noise)
         } else {
-            smooth::signal(&speed, speed_noise)
+            Motion::Speed(speed, speed_noise)
         };
 
         let measured = |values: &[f64], reference: Option<&[f64]>| {
@@ -104,17 +115,15 @@ impl Record {
         let channel = |signal: Signal, reference: Option<Signal>| {
             log.signal(signal).map(|values| measured(values, reference.and_then(|r| log.signal(r))))
         };
-        let normal_n = measured(contact.normal_force_n, None);
-        let mut load_n = smooth::signal(&normal_n.values, normal_n.noise_std);
-        load_n.values = ahead(&time_s, &load_n.values, BridgeModel::delay_s(&rig.normal_bridge));
         Ok(Self {
             role,
             source: log.source.clone(),
+            angle_noise_rad: if has_angle { angle_noise } else { speed_noise * step_s },
             step_s,
-            speed_rad_s,
-            load_n,
+            motion,
+            normal_late_s: BridgeModel::delay_s(&rig.normal_bridge),
             friction_nm: measured(contact.friction_torque_nm, None),
-            normal_n,
+            normal_n: measured(contact.normal_force_n, None),
             m1_torque_nm: channel(Signal::M1Torque, Some(Signal::M1TorqueRef)),
             m1_torque_ref_nm: log.signal(Signal::M1TorqueRef).map(|v| averaged(v, group)),
             m1_angle_rad: channel(Signal::M1Angle, None),
@@ -123,6 +132,26 @@ impl Record {
             time_s,
             angle_rad,
         })
+    }
+
+    /// Disc speed (rad/s) and normal force (N) for a model: smoothed, the force taken ahead by its
+    /// bridge's delay. With a seed the noise is put on once more before smoothing, so that the change of
+    /// a prediction shows what the noise of its inputs does to it.
+    pub fn inputs(&self, noise_seed: Option<u64>) -> (Vec<f64>, Vec<f64>) {
+        let mut noise = noise_seed.map(noise::White::new);
+        let mut noisy = |values: &[f64], std: f64| -> Vec<f64> {
+            match &mut noise {
+                Some(noise) => values.iter().map(|x| x + std * noise.next()).collect(),
+                None => values.to_vec(),
+            }
+        };
+        let speed = match &self.motion {
+            Motion::Angle(std) => smooth::slope(&self.time_s, &noisy(&self.angle_rad, *std), *std),
+            Motion::Speed(values, std) => smooth::signal(&noisy(values, *std), *std),
+        };
+        let load = &self.normal_n;
+        let load = smooth::signal(&noisy(&load.values, load.noise_std), load.noise_std);
+        (speed.values, ahead(&self.time_s, &load.values, self.normal_late_s))
     }
 
     /// Number of samples.

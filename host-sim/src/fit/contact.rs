@@ -115,7 +115,7 @@ impl<'a> Case<'a> {
     fn new(record: &'a Record, rig: &RigFile) -> Self {
         let radius_m = rig.friction_radius_m;
         let friction = &record.friction_nm;
-        let load = &record.load_n.values;
+        let (speed_rad_s, load) = record.inputs(None);
         let largest = load.iter().copied().fold(0.0, f64::max);
         let square = friction.values.iter().map(|x| x * x).sum::<f64>() / friction.values.len().max(1) as f64;
         let sigma = (friction.noise_std.powi(2) + SIGNAL_SHARE.powi(2) * square).sqrt().max(1e-12);
@@ -127,9 +127,9 @@ impl<'a> Case<'a> {
             .collect();
         let inputs = ContactInputs {
             time_s: record.time_s.clone(),
-            sliding_speed_m_s: record.speed_rad_s.values.iter().map(|v| v * radius_m).collect(),
+            sliding_speed_m_s: speed_rad_s.iter().map(|v| v * radius_m).collect(),
             disc_angle_rad: record.angle_rad.clone(),
-            normal_force_n: load.clone(),
+            normal_force_n: load,
             initial_friction_n: friction.values.first().copied().unwrap_or(0.0) / radius_m,
         };
         Self { record, inputs, weight }

@@ -2,8 +2,7 @@
 //!
 //! Order of the friction channel: ring, amplifier, drift and crosstalk, delay, clipping. A ring among the
 //! effects stands in for the rig file's. Delay and clipping act on the samples, as steps of changing
-//! length have no common memory. The element is taken as rested for 1 s, cold and unworn at the first
-//! sample. Effects of pressure and drive do not act here.
+//! length have no common memory. The element is taken as cold and unworn at the first sample. Effects of pressure and drive do not act here.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -18,8 +17,6 @@ use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 
-/// Age of the contact at the first sample.
-const RESTED_S: f64 = 1.0;
 /// The core's ring takes damping ratios from here …
 const LEAST_DAMPING: f64 = 1e-4;
 /// … to here.
@@ -68,7 +65,7 @@ pub(super) fn simulate(
     };
     let initial_nm = inputs.initial_friction_n * radius_m;
     let start = input(first.speed_m_s, first.load_n, first.angle_rad);
-    let mut state = extended.holding(initial_nm, &start, RESTED_S);
+    let mut state = extended.holding(initial_nm, &start);
     let lowpass_hz = rig.friction_bridge.lowpass_hz;
     let mut lowpass = lowpass_hz.map(|hz| SecondOrder::new(hz, FRAC_1_SQRT_2, initial_nm));
 

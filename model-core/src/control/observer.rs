@@ -143,7 +143,7 @@ impl Observer {
     pub(crate) fn fresh(&self) -> ObserverState {
         ObserverState {
             elements: [self.model.element.rest(); N_ELEMENTS],
-            around: self.model.around.holding(0.0, &ExtendedInput::default(), 0.0),
+            around: self.model.around.holding(0.0, &ExtendedInput::default()),
             lowpass: LowpassState::default(),
             mean_square: 0.0,
         }
@@ -293,11 +293,11 @@ mod tests {
             effects.set(extension, values).unwrap();
             f64::from(run(ObserverModel::extended(&lugre(), effects, 0.06).unwrap(), 0.0, 2000).predicted_nm)
         };
-        let crosstalk = predicted(Extension::BridgeCrosstalk, &[0.01]);
+        let crosstalk = predicted(Extension::BridgeCrosstalk, &[0.01, 0.0]);
         assert!((crosstalk - steady_nm() - 0.88).abs() < 1e-4, "0.01 N·m/N of 88 N: {crosstalk}");
         let film = predicted(Extension::ViscousFilm, &[10.0]);
         assert!((film - steady_nm() - 0.06 * 10.0 * 0.18).abs() < 1e-4, "r · 10 N·s/m · v: {film}");
-        let fade = predicted(Extension::ThermalFade, &[1e-2, 5.0, 0.5]);
+        let fade = predicted(Extension::ThermalFade, &[1e-2, 5.0, 0.0, 50.0, 0.5, 1.0]);
         assert!(fade < 0.99 * steady_nm(), "it heats up: {fade}");
     }
 

@@ -1,16 +1,16 @@
 //! Friction that varies with the angle of the disc: stones, joints, a worn spot.
 //!
-//! µ = µ0 (1 + Σ_k a_k cos k(φ − φ0) + b_k sin k(φ − φ0)),   k = 1 … 6
+//! µ = µ0 (1 + Σ_k a_k cos k(φ − φ0) + b_k sin k(φ − φ0)),   k = 1 … 10
 //!
 //! φ is the measured angle of the disc. The encoder is incremental, so its origin φ0 differs from one
 //! record to the next while the pattern on the disc stays.
-//! Left out: patterns finer than a sixth of a revolution, and different patterns under three elements.
+//! Left out: patterns finer than a tenth of a revolution, and different patterns under three elements.
 
 use crate::error::{ParameterError, require};
 use crate::real::Real;
 
 /// Highest order per revolution.
-pub const ORDERS: usize = 6;
+pub const ORDERS: usize = 10;
 
 /// Variation with the disc's angle, prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +36,14 @@ impl<T: Real> DiscAngle<T> {
         "sin5",
         "cos6",
         "sin6",
+        "cos7",
+        "sin7",
+        "cos8",
+        "sin8",
+        "cos9",
+        "sin9",
+        "cos10",
+        "sin10",
     ];
 
     /// Prepares the effect from values in the order of [`Self::NAMES`].
@@ -73,7 +81,7 @@ mod tests {
 
     #[test]
     fn orders_are_those_of_the_angle_and_turn_with_the_origin() {
-        let mut values = [0.0f64; 13];
+        let mut values = [0.0f64; 21];
         values[0] = 0.3;
         values[5] = 0.1;
         values[12] = -0.2;

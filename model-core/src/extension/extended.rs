@@ -9,6 +9,8 @@
 use super::friction_delay::Past;
 use super::ring_resonance::{RingResonance, RingState};
 use super::set::Extensions;
+use super::static_ageing::StaticAgeing;
+use super::thermal_fade::Heat;
 use super::wear_drift::Distance;
 use crate::error::{ParameterError, require};
 use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
@@ -50,7 +52,7 @@ pub struct ExtendedState<T> {
     tip_speed_m_s: T,
     time_s: T,
     time_missing_s: T,
-    heat_j: T,
+    heat_j: Heat<T>,
     distance: Distance<T>,
     age_s: T,
     creep_m: T,
@@ -77,22 +79,24 @@ impl<T: Real> ExtendedFriction<T> {
         self.effects.set_step_s(step_s);
     }
 
-    /// The state in which the elements hold `torque_nm` at the given input, as far as the load can carry
-    /// it; cold, unworn, and rested for `age_s`.
-    pub fn holding(&self, torque_nm: T, input: &ExtendedInput<T>, age_s: T) -> ExtendedState<T> {
+    /// The state in which the friction channel shows `shown_nm` at the given input, as far as the load can
+    /// carry it; cold and unworn.
+    pub fn holding(&self, shown_nm: T, input: &ExtendedInput<T>) -> ExtendedState<T> {
         let contact = self.contact(input, T::ZERO, T::ONE);
+        let crosstalk = self.effects.bridge_crosstalk.as_ref();
+        let torque_nm = shown_nm - crosstalk.map_or(T::ZERO, |c| c.torque_nm(input.normal_force_n));
         ExtendedState {
             friction: self.friction.holding(torque_nm / self.radius_m, &contact),
             force_n: torque_nm / self.radius_m,
             tip_speed_m_s: contact.sliding_speed_m_s,
             time_s: T::ZERO,
             time_missing_s: T::ZERO,
-            heat_j: T::ZERO,
+            heat_j: [T::ZERO; 2],
             distance: Distance::default(),
-            age_s,
+            age_s: self.effects.static_ageing.as_ref().map_or(T::ZERO, StaticAgeing::first_age_s),
             creep_m: T::ZERO,
             ring: RingResonance::holding(torque_nm),
-            past: Past::holding(torque_nm),
+            past: Past::holding(shown_nm),
         }
     }
 
@@ -114,7 +118,7 @@ impl<T: Real> ExtendedFriction<T> {
         let effects = &self.effects;
         let mut factor = T::ONE;
         if let Some(thermal) = &effects.thermal_fade {
-            factor = factor * thermal.factor(state.heat_j);
+            factor = factor * thermal.factor(&state.heat_j);
         }
         if let Some(wear) = &effects.wear_drift {
             factor = factor * wear.factor(&state.distance);
@@ -237,7 +241,7 @@ mod tests {
     ) -> ExtendedOutput<f64> {
         let mut input =
             ExtendedInput { disc_speed_rad_s: speed_rad_s, disc_angle_rad: 0.0, normal_force_n: load_n };
-        let mut state = model.holding(0.0, &input, 0.0);
+        let mut state = model.holding(0.0, &input);
         let mut out = ExtendedOutput::default();
         for _ in 0..(seconds / STEP_S).round() as usize {
             input.disc_angle_rad += speed_rad_s * STEP_S;
@@ -259,14 +263,20 @@ mod tests {
     fn contact_effects_change_the_torque_and_channel_effects_only_what_is_shown() {
         let plain = slide(&model(&[]), 5.0, 88.0, 2.0);
         let contact: [(Extension, &[f64]); 8] = [
-            (Extension::ThermalFade, &[1e-3, 5.0, 0.5]),
+            (Extension::ThermalFade, &[1e-3, 5.0, 0.0, 50.0, 0.5, 1.0]),
             (Extension::WearDrift, &[0.1, 100.0]),
             (Extension::LoadDependence, &[0.1, 50.0]),
-            (Extension::StaticAgeing, &[0.1, 1e-3, 1e-3]),
+            (Extension::StaticAgeing, &[0.1, 1e-3, 1e-3, 0.0]),
             (Extension::DirectionAsymmetry, &[0.1]),
             (Extension::BellCurve, &[0.5, 0.2, 1.0]),
             (Extension::ViscousFilm, &[10.0]),
-            (Extension::DiscAngle, &[0.0, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            (
+                Extension::DiscAngle,
+                &[
+                    0.0, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+                    0.0, 0.0, 0.0,
+                ],
+            ),
         ];
         for effect in contact {
             let out = slide(&model(&[effect]), 5.0, 88.0, 2.0);
@@ -274,7 +284,7 @@ mod tests {
             assert_eq!(out.torque_nm, out.shown_nm);
         }
         let channel: [(Extension, &[f64], f64); 4] = [
-            (Extension::BridgeCrosstalk, &[0.01], plain.torque_nm + 0.88),
+            (Extension::BridgeCrosstalk, &[0.01, 0.0], plain.torque_nm + 0.88),
             (Extension::BridgeDrift, &[0.1, 0.01, 0.0, 0.0, 0.0], plain.torque_nm * 1.02 + 0.2),
             (Extension::AdcSaturation, &[-3.0, 3.0], 3.0),
             (Extension::FrictionDelay, &[0.01], plain.torque_nm),
@@ -309,7 +319,7 @@ mod tests {
         let effect: (Extension, &[f64]) = (Extension::RubberRelaxation, &[1e5, 0.05]);
         let model = model(&[effect]);
         let input = ExtendedInput { disc_speed_rad_s: 0.0, disc_angle_rad: 0.0, normal_force_n: 88.0 };
-        let mut state = model.holding(2.0, &input, 0.0);
+        let mut state = model.holding(2.0, &input);
         let first = model.step(&mut state, &input).torque_nm;
         let mut last = first;
         for _ in 0..10_000 {

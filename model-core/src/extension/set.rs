@@ -19,7 +19,7 @@ use crate::error::ParameterError;
 use crate::real::Real;
 
 /// Most values that an effect has.
-pub const MOST_VALUES: usize = 13;
+pub const MOST_VALUES: usize = 21;
 
 macro_rules! effects {
     ($($variant:ident, $field:ident, $type:ident, $id:literal, [$($step:ident)?];)*) => {

@@ -4,6 +4,7 @@
 //!
 //! The state is the age φ of the contact (Dieterich's ageing law, 1979; for rubber and polymers Baumberger
 //! and Caroli 2006): at rest it is the dwell time, and sliding over the memory length D renews the contact.
+//! At the start of a record it is what the record does not show: a parameter.
 //! In steady sliding φ = D/|v|, a slow fall with speed that g(v) takes up.
 
 use crate::error::{ParameterError, require};
@@ -15,24 +16,32 @@ pub struct StaticAgeing<T> {
     growth: T,
     inverse_onset: T,
     inverse_memory: T,
+    first_age_s: T,
 }
 
 impl<T: Real> StaticAgeing<T> {
     /// Names of the parameters: relative growth of friction per e-fold of age; age at which it sets in,
-    /// s; memory length, m.
-    pub const NAMES: &'static [&'static str] = &["growth", "onset_s", "memory_m"];
+    /// s; memory length, m; age at the start, s.
+    pub const NAMES: &'static [&'static str] = &["growth", "onset_s", "memory_m", "first_age_s"];
 
     /// Prepares the effect from values in the order of [`Self::NAMES`].
-    pub fn new(values: &[T; 3]) -> Result<Self, ParameterError> {
-        let [growth, onset, memory] = *values;
+    pub fn new(values: &[T; 4]) -> Result<Self, ParameterError> {
+        let [growth, onset, memory, first_age] = *values;
         let growth_allowed = growth >= T::ZERO && growth <= T::from_f64(10.0);
         let onset_allowed = onset >= T::from_f64(1e-4) && onset <= T::from_f64(1e4);
         let memory_allowed = memory >= T::from_f64(1e-6) && memory <= T::ONE;
+        let first_age_allowed = first_age >= T::ZERO && first_age <= T::from_f64(1e7);
         Ok(Self {
+            first_age_s: require("first_age_s", first_age, first_age_allowed, "0 to 1e7 s")?,
             growth: require("growth", growth, growth_allowed, "0 to 10")?,
             inverse_onset: T::ONE / require("onset_s", onset, onset_allowed, "1e-4 to 1e4 s")?,
             inverse_memory: T::ONE / require("memory_m", memory, memory_allowed, "1e-6 to 1 m")?,
         })
+    }
+
+    /// Age at the start, s.
+    pub fn first_age_s(&self) -> T {
+        self.first_age_s
     }
 
     /// What friction is multiplied with at an age.
@@ -57,7 +66,7 @@ mod tests {
 
     #[test]
     fn the_contact_ages_at_rest_and_is_renewed_over_the_memory_length() {
-        let effect = StaticAgeing::new(&[0.1f64, 0.01, 1e-3]).unwrap();
+        let effect = StaticAgeing::new(&[0.1f64, 0.01, 1e-3, 0.0]).unwrap();
         let mut age = 0.0;
         for _ in 0..10_000 {
             effect.advance(&mut age, 0.0, 1e-3);

@@ -1,0 +1,651 @@
+//! The contact as a problem of least squares: any set of effects, fitted jointly with the baseline.
+//!
+//! **Error model.** The friction torque is noisy, and so are speed and normal force that drive the model.
+//! A model cannot be driven with noise-free inputs, so the inputs are smoothed first, and each sample of
+//! the residual is divided by √(σ_T² + σ_in² + σ_t²): the channel's noise, what the inputs' noise does to
+//! the prediction (measured by running the fitted baseline with the noise put on once more), and a fifth of
+//! a sample's change of the torque (the log does not say at which instant within a sample a channel was
+//! read). Where the inputs' noise would move the prediction by more than [`BLIND`] σ_T the sample is masked:
+//! stuck on stiff bristles, the force depends on motion below the encoder's resolution.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use rayon::prelude::*;
+
+use super::super::effects::{ContactEffect, LIBRARY, Scales, Start, effect};
+use super::super::record::Record;
+use super::super::search::{self, Point};
+use super::baseline;
+use super::bins::{self, Bin};
+use super::model::{ContactModel, Torques};
+use super::plan::Plan;
+use super::witness::DriveWitness;
+use crate::diagnose::analysis::Role;
+use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::rig_file::RigFile;
+use crate::fit::bounds::Parameter;
+use crate::input_error::InputError;
+
+/// Input noise, in standard deviations of the channel, beyond which a sample tells nothing.
+const BLIND: f64 = 3.0;
+/// Part of a sample by which a channel may be late without blame.
+const LATENESS: f64 = 0.2;
+/// Time over which sliding is told from swinging on the bristles, s …
+const STUCK_S: f64 = 6e-3;
+/// … if it covers less than so many of their largest deflections.
+const STUCK_REACHES: f64 = 6.0;
+/// Part of what the ring adds that a record's timing leaves open.
+const RING_PHASE: f64 = 0.7;
+/// Number of noisy runs that measure what the inputs' noise does.
+const NOISY_RUNS: u64 = 3;
+/// Renewals of the derivatives in the search from one start, and of the best of them.
+const FIRST_ROUNDS: usize = 1;
+const ROUNDS: usize = 3;
+
+/// A free parameter and what it belongs to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slot {
+    /// Effect, `None` for the baseline.
+    pub effect: Option<&'static str>,
+    /// Log that it belongs to, for origins.
+    pub log: Option<usize>,
+    /// Name, bounds, scale.
+    pub parameter: Parameter,
+}
+
+/// A combination of effects with the form of each.
+pub type Combination = Vec<(&'static str, usize)>;
+
+/// A fitted combination.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Effects and their forms.
+    pub combination: Combination,
+    /// Free parameters.
+    pub slots: Vec<Slot>,
+    /// Values, residuals, derivatives.
+    pub point: Point,
+}
+
+/// Records, weights and baseline of the contact.
+pub struct Problem {
+    /// The rig.
+    pub rig: RigFile,
+    /// The baseline that fits start from.
+    pub baseline: ContactModel,
+    /// Training logs, then those held out.
+    pub records: Vec<Record>,
+    /// Bins of each record.
+    pub bins: Vec<Vec<Bin>>,
+    /// Friction torque of each bin.
+    pub measured_nm: Vec<Vec<f64>>,
+    /// Steps of each record's bins.
+    pub plans: Vec<Plan>,
+    /// Expected standard deviation of the residual of each bin; NaN is masked.
+    pub sigma_nm: Vec<Vec<f64>>,
+    /// What the library knows about the records.
+    pub scales: Scales,
+    witness: Option<DriveWitness>,
+    fits: Mutex<HashMap<Combination, Arc<Fitted>>>,
+}
+
+impl Problem {
+    /// Prepares logs (training first), smooths inputs, fits the baseline and sets the weights.
+    pub fn new(rig: &RigFile, file: &ModelFile, records: Vec<Record>) -> Result<Self, InputError> {
+        let radius_m = rig.friction_radius_m;
+        let prepared: Vec<(Vec<Bin>, Plan)> = records
+            .par_iter()
+            .map(|record| {
+                let (speed, load) = record.inputs(None);
+                let bins = bins::adaptive(record, radius_m, &speed, &load);
+                let plan = Plan::new(record, &bins, radius_m, &speed, &load);
+                (bins, plan)
+            })
+            .collect();
+        let (bins, plans): (Vec<Vec<Bin>>, Vec<Plan>) = prepared.into_iter().unzip();
+        let measured_nm = records
+            .iter()
+            .zip(&bins)
+            .map(|(record, bins)| bins.iter().map(|bin| bin.mean(&record.friction_nm.values)).collect())
+            .collect();
+        let baseline = ContactModel::new(file);
+        let scales = scales(rig, &baseline, &records);
+        let training: Vec<&Record> = records.iter().filter(|r| r.role == Role::Train).collect();
+        let witness = DriveWitness::new(
+            &training,
+            &bins.iter().map(Vec::as_slice).collect::<Vec<_>>()[..training.len()],
+        );
+        let mut problem = Self {
+            rig: rig.clone(),
+            baseline,
+            sigma_nm: Vec::new(),
+            bins,
+            measured_nm,
+            plans,
+            records,
+            scales,
+            witness,
+            fits: Mutex::new(HashMap::new()),
+        };
+        problem.sigma_nm = problem.weights(&problem.baseline.clone())?;
+        let first = problem.fit(&Vec::new(), None).ok_or_else(|| {
+            InputError::new("the baseline has no finite prediction for these logs").file(file.source.as_str())
+        })?;
+        let fitted = problem.model(&first, 0);
+        problem.sigma_nm = problem.weights(&fitted)?;
+        problem.baseline = ContactModel { effects: Vec::new(), ..fitted };
+        problem.scales.stiffness_n_per_m = problem.baseline.parameter("k_u_n_per_m").unwrap_or(3e4);
+        problem.fits.lock().map_err(|_| InputError::new("a fit was interrupted"))?.clear();
+        problem.fit(&Vec::new(), Some(&first));
+        Ok(problem)
+    }
+
+    /// Number of training logs.
+    pub fn training(&self) -> usize {
+        self.records.iter().filter(|record| record.role == Role::Train).count()
+    }
+
+    /// Runs a model over a record.
+    pub fn run(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
+        let record = &self.records[log];
+        let window = record.friction_nm.values.len().clamp(1, 20);
+        let first_nm = record.friction_nm.values[..window].iter().sum::<f64>() / window as f64;
+        model.run(&self.rig, &self.plans[log], first_nm)
+    }
+
+    /// Expected standard deviation of the residual of each sample, see above.
+    fn weights(&self, model: &ContactModel) -> Result<Vec<Vec<f64>>, InputError> {
+        (0..self.records.len()).into_par_iter().map(|log| self.weights_of(model, log)).collect()
+    }
+
+    fn weights_of(&self, model: &ContactModel, log: usize) -> Result<Vec<f64>, InputError> {
+        let record = &self.records[log];
+        let plain = self.run(model, log)?;
+        // What the ring adds: its phase is not known to a fraction of a sample.
+        let ringing: Vec<f64> =
+            plain.shown_nm.iter().zip(&plain.true_nm).map(|(a, b)| (a - b).abs()).collect();
+        let ringing = around(&ringing, 4, |window| window.iter().copied().fold(0.0, f64::max));
+        let plain = plain.shown_nm;
+        let mut spread = vec![0.0; plain.len()];
+        for seed in 1..=NOISY_RUNS {
+            let (speed, load) = record.inputs(Some(seed + 100 * log as u64));
+            let plan = Plan::new(record, &self.bins[log], self.rig.friction_radius_m, &speed, &load);
+            let first_nm = plain.first().copied().unwrap_or(0.0);
+            let noisy = model.run(&self.rig, &plan, first_nm)?.shown_nm;
+            for (sum, (a, b)) in spread.iter_mut().zip(noisy.iter().zip(&plain)) {
+                *sum += (a - b).powi(2) / NOISY_RUNS as f64;
+            }
+        }
+        let spread = around(&spread, 10, |window| window.iter().sum::<f64>() / window.len() as f64);
+        let changes: Vec<f64> = (0..plain.len())
+            .map(|i| {
+                let (a, b) = (i.saturating_sub(1), (i + 1).min(plain.len() - 1));
+                let span_s = self.plans[log].time_s[b] - self.plans[log].time_s[a];
+                (plain[b] - plain[a]).abs() / span_s.max(1e-9) * record.step_s
+            })
+            .collect();
+        let changes = around(&changes, 3, |window| window.iter().copied().fold(0.0, f64::max));
+        let own = record.friction_nm.noise_std.max(1e-9);
+        let stuck = self.stuck(model, log);
+        let sigma = self.bins[log].iter().enumerate().map(|(i, bin)| {
+            let samples = bin.from..bin.to;
+            let tells = samples.clone().all(|k| !record.friction_nm.clipped(k) && !stuck[k]);
+            if !tells || spread[i].sqrt() > BLIND * own {
+                return f64::NAN;
+            }
+            let timing = (LATENESS * changes[i]).powi(2) + (RING_PHASE * ringing[i]).powi(2);
+            (own * own / bin.len() as f64 + spread[i] + timing).sqrt()
+        });
+        Ok(sigma.collect())
+    }
+
+    /// Where stiff bristles stick: the last few milliseconds' motion is a matter of micrometres, and a
+    /// micrometre more or less is a force far above the noise.
+    pub fn stuck(&self, model: &ContactModel, log: usize) -> Vec<bool> {
+        let record = &self.records[log];
+        let radius_m = self.rig.friction_radius_m;
+        let (stiffness, most_friction) = model.stiffness_and_friction();
+        let resolution_m = radius_m * record.angle_noise_rad;
+        if resolution_m * stiffness * radius_m < BLIND * record.friction_nm.noise_std {
+            return vec![false; record.len()];
+        }
+        let (_, load) = record.inputs(None);
+        let mut stuck = vec![false; record.len()];
+        let mut from = 0;
+        for at in 0..record.len() {
+            while record.time_s[at] - record.time_s[from] > STUCK_S {
+                from += 1;
+            }
+            // The largest excursion within the window: a swing on the bristles is no sliding.
+            let moved_m = radius_m * (record.angle_rad[at] - record.angle_rad[from]).abs();
+            let reach_m = load[at].max(0.0) * most_friction / stiffness;
+            stuck[at] = moved_m < STUCK_REACHES * reach_m + 4.0 * resolution_m;
+        }
+        // The window looks back; what it calls sliding may have stuck a moment ago, and the reverse.
+        let dilated = around(&stuck.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<_>>(), 2, |w| {
+            w.iter().copied().fold(0.0, f64::max)
+        });
+        dilated.into_iter().map(|s| s > 0.5).collect()
+    }
+
+    /// Free parameters of a combination.
+    fn slots(&self, combination: &Combination) -> Vec<Slot> {
+        let shared = |effect, parameter| Slot { effect, log: None, parameter };
+        let mut slots: Vec<Slot> = baseline::parameters(&self.baseline, self.scales.step_s)
+            .into_iter()
+            .map(|parameter| shared(None, parameter))
+            .collect();
+        for (id, variant) in combination {
+            let Some(effect) = effect(id) else { continue };
+            slots.extend(effect.parameters(*variant, &self.scales).into_iter().map(|p| shared(Some(id), p)));
+            if let Some(origin) = effect.origin() {
+                slots.extend((1..self.training()).map(|log| Slot {
+                    effect: Some(id),
+                    log: Some(log),
+                    parameter: origin.clone(),
+                }));
+            }
+        }
+        slots
+    }
+
+    /// The model of one log from values of the slots.
+    fn assemble(
+        &self,
+        combination: &Combination,
+        slots: &[Slot],
+        values: &[f64],
+        log: usize,
+        other_origin: f64,
+    ) -> ContactModel {
+        let mut model = self.baseline.clone();
+        for (slot, value) in slots.iter().zip(values).filter(|(slot, _)| slot.effect.is_none()) {
+            if slot.parameter.name == baseline::LATE {
+                model.late_s = *value;
+            } else if let Some((_, old)) =
+                model.parameters.iter_mut().find(|(name, _)| *name == slot.parameter.name)
+            {
+                *old = *value;
+            }
+        }
+        for (id, variant) in combination {
+            let Some(effect) = effect(id) else { continue };
+            let own = || slots.iter().zip(values).filter(|(slot, _)| slot.effect == Some(*id));
+            let shared: Vec<f64> = own().filter(|(s, _)| s.log.is_none()).map(|(_, v)| *v).collect();
+            let origin = own().find(|(s, _)| s.log == Some(log)).map_or(other_origin, |(_, v)| *v);
+            effect.apply(*variant, &shared, origin, &self.scales, &mut model);
+        }
+        model
+    }
+
+    fn model_with(&self, fitted: &Fitted, log: usize, origin: f64) -> ContactModel {
+        self.assemble(&fitted.combination, &fitted.slots, &fitted.point.values, log, origin)
+    }
+
+    /// The fitted model of a log. The origin of a log that is held out is the one thing fitted to it:
+    /// nothing else tells where on the disc its angle began.
+    pub fn model(&self, fitted: &Fitted, log: usize) -> ContactModel {
+        let plain = self.model_with(fitted, log, 0.0);
+        let needs_origin =
+            fitted.combination.iter().any(|(id, _)| effect(id).is_some_and(|e| e.origin().is_some()));
+        if !needs_origin || log < self.training() {
+            return plain;
+        }
+        let loss = |origin: f64| -> f64 {
+            let model = self.model_with(fitted, log, origin);
+            let Ok(found) = self.run(&model, log) else { return f64::INFINITY };
+            self.friction_residuals(log, &found.shown_nm).iter().map(|r| search::loss(*r)).sum()
+        };
+        let best = |tries: Vec<f64>| -> f64 {
+            let losses: Vec<(f64, f64)> = tries.into_par_iter().map(|o| (loss(o), o)).collect();
+            losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |(_, origin)| origin)
+        };
+        let step = std::f64::consts::TAU / 48.0;
+        let mut origin = best((0..48).map(|k| step * f64::from(k)).collect());
+        let mut width = step;
+        for _ in 0..3 {
+            origin = best((-4..=4).map(|k| origin + width * 0.25 * f64::from(k)).collect());
+            width *= 0.25;
+        }
+        self.model_with(fitted, log, origin)
+    }
+
+    /// Residuals of the training logs, then those of the witness.
+    fn residuals(&self, combination: &Combination, slots: &[Slot], values: &[f64]) -> Option<Vec<f64>> {
+        let mut all = Vec::new();
+        let mut torques = Vec::new();
+        for log in 0..self.training() {
+            let model = self.assemble(combination, slots, values, log, 0.0);
+            let found = self.run(&model, log).ok()?;
+            all.extend(self.friction_residuals(log, &found.shown_nm));
+            torques.push(found);
+        }
+        if let Some(witness) = &self.witness {
+            all.extend(witness.residuals(&torques));
+        }
+        Some(all)
+    }
+
+    /// Residuals of the friction channel of a log over their expected standard deviation.
+    pub fn friction_residuals(&self, log: usize, shown_nm: &[f64]) -> Vec<f64> {
+        self.measured_nm[log]
+            .iter()
+            .zip(shown_nm)
+            .zip(&self.sigma_nm[log])
+            .map(|((m, p), s)| (m - p) / s)
+            .collect()
+    }
+
+    /// Fits a combination, starting from `near` (a fit of a part of it). `None` where no start has a
+    /// finite prediction.
+    pub fn fit(&self, combination: &Combination, near: Option<&Fitted>) -> Option<Arc<Fitted>> {
+        if let Some(found) = self.fits.lock().ok()?.get(combination) {
+            return Some(found.clone());
+        }
+        let slots = self.slots(combination);
+        let parameters: Vec<Parameter> = slots.iter().map(|slot| slot.parameter.clone()).collect();
+        let residuals = |values: &[f64]| self.residuals(combination, &slots, values);
+        let known = |slot: &Slot| -> Option<f64> {
+            let near = near?;
+            let same = |s: &&Slot| {
+                s.effect == slot.effect && s.log == slot.log && s.parameter.name == slot.parameter.name
+            };
+            let at = near.slots.iter().position(|s| same(&s))?;
+            Some(near.point.values[at])
+        };
+        let base: Vec<f64> = slots.iter().map(|s| known(s).unwrap_or(s.parameter.start)).collect();
+        let fresh: Vec<(&'static str, usize)> = combination
+            .iter()
+            .copied()
+            .filter(|(id, _)| !near.is_some_and(|n| n.combination.iter().any(|(known, _)| known == id)))
+            .collect();
+        let mut starts: Vec<Point> = Vec::new();
+        match fresh.as_slice() {
+            [] => {
+                if near.is_none() {
+                    starts.extend(self.baseline_starts(&slots, &base, &residuals));
+                }
+                starts.extend(Point::at(base, &residuals));
+            }
+            [(id, variant)] => {
+                starts.extend(self.starts_of(combination, &slots, &base, near, (*id, *variant)));
+            }
+            _ => return None,
+        }
+        let several = starts.len() > 1;
+        let mut best = starts
+            .into_par_iter()
+            .map(|start| search::refine(start, &parameters, &residuals, FIRST_ROUNDS))
+            .min_by(|a, b| a.loss.total_cmp(&b.loss))?;
+        if several || FIRST_ROUNDS < ROUNDS {
+            best = search::refine(best, &parameters, &residuals, ROUNDS - FIRST_ROUNDS);
+        }
+        let fitted = Arc::new(Fitted { combination: combination.clone(), slots, point: best });
+        self.fits.lock().ok()?.insert(combination.clone(), fitted.clone());
+        Some(fitted)
+    }
+
+    /// Continues a fit for more rounds: for the few that matter.
+    pub fn polish(&self, fitted: &Fitted, rounds: usize) -> Fitted {
+        let parameters: Vec<Parameter> = fitted.slots.iter().map(|slot| slot.parameter.clone()).collect();
+        let residuals = |values: &[f64]| self.residuals(&fitted.combination, &fitted.slots, values);
+        let mut point = fitted.point.clone();
+        point.columns.clear();
+        Fitted { point: search::refine(point, &parameters, &residuals, rounds), ..fitted.clone() }
+    }
+
+    fn baseline_starts(&self, slots: &[Slot], base: &[f64], residuals: &search::Residuals<'_>) -> Vec<Point> {
+        let start = |factors: &&[(&str, f64)]| {
+            let mut values = base.to_vec();
+            for (name, factor) in *factors {
+                if let Some(at) = slots.iter().position(|s| s.effect.is_none() && s.parameter.name == *name) {
+                    let parameter = &slots[at].parameter;
+                    values[at] = (values[at] * factor).clamp(parameter.low, parameter.high);
+                }
+            }
+            Point::at(values, residuals)
+        };
+        baseline::other_starts(self.baseline.kind).iter().filter_map(start).collect()
+    }
+
+    /// Up to two starts for an effect that is added: the shapes of the library that promise most.
+    fn starts_of(
+        &self,
+        combination: &Combination,
+        slots: &[Slot],
+        base: &[f64],
+        near: Option<&Fitted>,
+        (id, variant): (&'static str, usize),
+    ) -> Vec<Point> {
+        let Some(effect) = effect(id) else { return Vec::new() };
+        let residuals = |values: &[f64]| self.residuals(combination, slots, values);
+        let own: Vec<usize> =
+            (0..slots.len()).filter(|i| slots[*i].effect == Some(id) && slots[*i].log.is_none()).collect();
+        if effect.origin().is_some() && self.training() > 1 {
+            return self.origin_start(&own, slots, base, near, &residuals).into_iter().collect();
+        }
+        let mut points: Vec<Point> = effect
+            .starts(variant, &self.scales)
+            .into_par_iter()
+            .filter_map(|start| self.start(&start, &own, slots, base, near, &residuals))
+            .collect();
+        points.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+        points.truncate(2);
+        points
+    }
+
+    /// A start for an effect whose shared parameters are cosine and sine amplitudes of the orders of an
+    /// angle (in turn) and whose origin differs from log to log: amplitudes for each log by a linear step,
+    /// then the turns that bring the logs' patterns together.
+    fn origin_start(
+        &self,
+        own: &[usize],
+        slots: &[Slot],
+        base: &[f64],
+        near: Option<&Fitted>,
+        residuals: &search::Residuals<'_>,
+    ) -> Option<Point> {
+        let parameters: Vec<Parameter> = slots.iter().map(|slot| slot.parameter.clone()).collect();
+        let point = Point::at(base.to_vec(), residuals)?;
+        let columns: Vec<Vec<f64>> = own
+            .par_iter()
+            .map(|at| search::column(&parameters, &point, *at, residuals))
+            .collect::<Option<_>>()?;
+        let mut extra = Vec::new();
+        let mut row = 0;
+        for log in 0..self.training() {
+            let rows = row..row + self.bins[log].len();
+            row = rows.end;
+            for column in &columns {
+                let mut part = vec![0.0; column.len()];
+                part[rows.clone()].copy_from_slice(&column[rows.clone()]);
+                extra.push(part);
+            }
+        }
+        let near_columns = near.map_or(Vec::new(), |n| n.point.columns.clone());
+        let full = Point {
+            columns: near_columns.into_iter().filter(|c| c.len() == point.residuals.len()).collect(),
+            ..point.clone()
+        };
+        let (_, found) = search::promise(&full, &extra)?;
+        let orders = own.len() / 2;
+        let pattern = |log: usize, order: usize| {
+            let at = log * own.len() + 2 * order;
+            (found[at], found[at + 1])
+        };
+        let mut values = base.to_vec();
+        let mut mean: Vec<(f64, f64)> = (0..orders).map(|order| pattern(0, order)).collect();
+        for log in 1..self.training() {
+            // cos k(φ − o) has the amplitudes of cos kφ turned by k·o.
+            let overlap = |origin: f64| -> f64 {
+                (0..orders)
+                    .map(|order| {
+                        let ((a, b), (c, d)) = (pattern(0, order), pattern(log, order));
+                        let (sine, cosine) = ((order + 1) as f64 * origin).sin_cos();
+                        c * (a * cosine - b * sine) + d * (a * sine + b * cosine)
+                    })
+                    .sum()
+            };
+            let tries = (0..720).map(|k| std::f64::consts::TAU * f64::from(k) / 720.0 - std::f64::consts::PI);
+            let origin = tries.max_by(|a, b| overlap(*a).total_cmp(&overlap(*b)))?;
+            for (order, mean) in mean.iter_mut().enumerate() {
+                let (c, d) = pattern(log, order);
+                let (sine, cosine) = ((order + 1) as f64 * origin).sin_cos();
+                mean.0 += c * cosine + d * sine;
+                mean.1 += d * cosine - c * sine;
+            }
+            if let Some(at) =
+                slots.iter().position(|s| s.effect == slots[own[0]].effect && s.log == Some(log))
+            {
+                values[at] = origin;
+            }
+        }
+        for (order, (a, b)) in mean.into_iter().enumerate() {
+            for (at, amplitude) in [(own[2 * order], a), (own[2 * order + 1], b)] {
+                let parameter = &parameters[at];
+                values[at] = (amplitude / self.training() as f64).clamp(parameter.low, parameter.high);
+            }
+        }
+        Point::at(values, residuals)
+    }
+
+    /// The point of one start, with amplitudes by a linear step from the fit it extends.
+    fn start(
+        &self,
+        start: &Start,
+        own: &[usize],
+        slots: &[Slot],
+        base: &[f64],
+        near: Option<&Fitted>,
+        residuals: &search::Residuals<'_>,
+    ) -> Option<Point> {
+        let parameters: Vec<Parameter> = slots.iter().map(|slot| slot.parameter.clone()).collect();
+        let mut values = base.to_vec();
+        for (at, value) in own.iter().zip(&start.values) {
+            values[*at] = value.clamp(parameters[*at].low, parameters[*at].high);
+        }
+        let columns_of_near = |point: &Point| {
+            // Derivatives by the baseline and by effects already there, in this fit's order.
+            let near = near?;
+            let columns: Vec<Vec<f64>> = slots
+                .iter()
+                .map(|slot| {
+                    let at = near.slots.iter().position(|s| {
+                        s.effect == slot.effect
+                            && s.log == slot.log
+                            && s.parameter.name == slot.parameter.name
+                    });
+                    let column = at.and_then(|at| near.point.columns.get(at)).cloned();
+                    column.filter(|c| c.len() == point.residuals.len()).unwrap_or_default()
+                })
+                .collect();
+            Some(columns)
+        };
+        let mut point = Point::at(values, residuals)?;
+        if !start.amplitudes.is_empty() {
+            let wanted: Vec<usize> = start.amplitudes.iter().map(|k| own[*k]).collect();
+            let extra: Vec<Vec<f64>> = wanted
+                .iter()
+                .map(|at| search::column(&parameters, &point, *at, residuals).unwrap_or_default())
+                .collect();
+            point.columns = columns_of_near(&point)?.into_iter().filter(|c| !c.is_empty()).collect();
+            let (_, amplitudes) = search::promise(&point, &extra)?;
+            let mut best: Option<Point> = None;
+            for share in [1.0, 0.4] {
+                let mut values = point.values.clone();
+                for (at, amplitude) in wanted.iter().zip(&amplitudes) {
+                    let parameter = &parameters[*at];
+                    values[*at] = (share * amplitude).clamp(parameter.low, parameter.high);
+                }
+                if let Some(next) = Point::at(values, residuals)
+                    && best.as_ref().is_none_or(|b| next.loss < b.loss)
+                {
+                    best = Some(next);
+                }
+            }
+            point = best?;
+        }
+        // The baseline's derivatives are those of the fit it extends; the effect's own are computed.
+        if let Some(mut columns) = columns_of_near(&point) {
+            for (at, column) in columns.iter_mut().enumerate() {
+                if column.is_empty() {
+                    *column = search::column(&parameters, &point, at, residuals).unwrap_or_default();
+                }
+            }
+            point.columns = columns;
+        }
+        Some(point)
+    }
+
+    /// Effects that these records and this baseline allow, with their forms.
+    pub fn conceivable(&self) -> Vec<&'static dyn ContactEffect> {
+        LIBRARY.into_iter().filter(|effect| effect.applies(&self.baseline, &self.scales)).collect()
+    }
+
+    /// Names of the witnesses after the friction channel.
+    pub fn has_drive_witness(&self) -> bool {
+        self.witness.is_some()
+    }
+}
+
+/// Each value replaced by a statistic of its neighbours within `half` samples.
+fn around(values: &[f64], half: usize, statistic: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+    let window = |i: usize| &values[i.saturating_sub(half)..(i + half + 1).min(values.len())];
+    (0..values.len()).map(|i| statistic(window(i))).collect()
+}
+
+fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales {
+    let radius_m = rig.friction_radius_m;
+    let mut scales = Scales {
+        duration_s: 0.0,
+        distance_m: 0.0,
+        power_w: 0.0,
+        load_n: 1.0,
+        torque_nm: 1e-3,
+        speed_m_s: (0.01, 1.0),
+        step_s: records.iter().map(|r| r.step_s).fold(0.0, f64::max),
+        friction_ends_nm: None,
+        ring_hz: rig.friction_bridge.mode.map(|mode| mode.mode_hz),
+        ring_damping: rig.friction_bridge.mode.map(|mode| mode.damping_ratio),
+        stiffness_n_per_m: match baseline.kind {
+            ModelKind::Series => baseline.parameter("k_u_n_per_m").unwrap_or(3e4),
+            _ => 3e4,
+        },
+    };
+    let (mut speeds, mut loads) = (Vec::new(), Vec::new());
+    let (mut squares, mut work_j, mut sliding_s, mut count) = (0.0, 0.0, 0.0, 0usize);
+    for record in records {
+        let (speed, load) = record.inputs(None);
+        let mut distance_m = 0.0;
+        for i in 0..record.len() {
+            let (v, torque) = (radius_m * speed[i], record.friction_nm.values[i]);
+            distance_m += v.abs() * record.step_s;
+            squares += torque * torque;
+            count += 1;
+            if load[i] > 1.0 {
+                loads.push(load[i]);
+            }
+            if v.abs() > 2e-3 && load[i] > 1.0 {
+                speeds.push(v.abs());
+                work_j += (torque * speed[i]).abs() * record.step_s;
+                sliding_s += record.step_s;
+            }
+        }
+        scales.distance_m = scales.distance_m.max(distance_m);
+        scales.duration_s = scales.duration_s.max(record.time_s.last().copied().unwrap_or(0.0));
+    }
+    let quantile = |values: &mut Vec<f64>, share: f64| {
+        let rank = ((values.len().max(1) - 1) as f64 * share) as usize;
+        if values.is_empty() { None } else { Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1) }
+    };
+    scales.load_n = quantile(&mut loads, 0.5).unwrap_or(1.0);
+    if let (Some(low), Some(high)) = (quantile(&mut speeds, 0.05), quantile(&mut speeds, 0.95)) {
+        scales.speed_m_s = (low, high.max(2.0 * low));
+    }
+    scales.torque_nm = (squares / count.max(1) as f64).sqrt().max(1e-6);
+    scales.power_w = if sliding_s > 0.0 { (work_j / sliding_s).max(1e-6) } else { 1.0 };
+    scales.distance_m = scales.distance_m.max(1e-3);
+    scales.duration_s = scales.duration_s.max(1e-3);
+    scales
+}

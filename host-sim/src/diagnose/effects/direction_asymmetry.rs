@@ -1,0 +1,36 @@
+//! Friction differs between the directions of sliding ([`model_core::extension::direction_asymmetry`]).
+//!
+//! Signature: the residual's ratio to friction has one value forward and the opposite backward, at every
+//! load and speed, and M2 feels it. Rivals: crosstalk adds the same torque at any speed and also at rest, and
+//! M2 does not feel it; an asymmetric bearing is not seen by the friction bridge.
+
+use model_core::extension::Extension;
+
+use super::{ContactEffect, ContactModel, Parameter, Scales, Start};
+
+pub(super) struct DirectionAsymmetry;
+
+impl ContactEffect for DirectionAsymmetry {
+    fn id(&self) -> &'static str {
+        "direction_asymmetry"
+    }
+
+    fn parameters(&self, _variant: usize, _scales: &Scales) -> Vec<Parameter> {
+        vec![Parameter::linear("asymmetry", 0.0, -0.8, 0.8)]
+    }
+
+    fn starts(&self, _variant: usize, _scales: &Scales) -> Vec<Start> {
+        vec![Start::shape(&[0.0], &[0])]
+    }
+
+    fn apply(
+        &self,
+        _variant: usize,
+        values: &[f64],
+        _origin: f64,
+        _scales: &Scales,
+        model: &mut ContactModel,
+    ) {
+        model.set(Extension::DirectionAsymmetry, values.to_vec());
+    }
+}
