@@ -192,12 +192,15 @@ impl ModelFile {
             root.choice("kind", &MODEL_KINDS)?.ok_or_else(|| root.missing("kind", &names.join(", ")))?;
         let table =
             root.table("parameters")?.ok_or_else(|| root.missing("parameters", "a table [parameters]"))?;
+        let given = kind.parameters().iter().map(|spec| table.number(spec.name, FINITE));
+        let given = given.collect::<Result<Vec<_>, _>>()?;
+        // A misspelt name is both unknown and missing: the line that has it is the one to show.
+        table.finish()?;
         let mut values = Vec::new();
-        for spec in kind.parameters() {
-            let value = table.number(spec.name, FINITE)?.or(spec.default);
+        for (spec, value) in kind.parameters().iter().zip(given) {
+            let value = value.or(spec.default);
             values.push(value.ok_or_else(|| table.missing(spec.name, "a finite number"))?);
         }
-        table.finish()?;
         let intervals = root.table("intervals")?.map(|table| read_intervals(&table, kind)).transpose()?;
         let extensions = root.tables("extension")?.iter().map(read_extension).collect::<Result<_, _>>()?;
         root.finish()?;
@@ -376,6 +379,10 @@ mod tests {
         assert_eq!(
             refused(&LUGRE.replace("a0 = 0.5\n", "")),
             "m.toml:2: parameters.a0: is missing; allowed: a finite number"
+        );
+        assert!(
+            refused(&LUGRE.replace("a0 =", "a00 ="))
+                .contains("parameters.a00 = 0.5: unknown key; allowed: sigma0_n_per_m, ")
         );
         assert_eq!(
             refused(&LUGRE.replace("lugre", "dahl")),
