@@ -363,9 +363,9 @@ mod tests {
     fn a_model_written_reads_back_the_same() {
         let mut model = ModelFile::parse("m.toml", LUGRE).unwrap();
         model.intervals.insert("a0".into(), Interval { std: 0.01, low: 0.48, high: 0.52 });
-        let names = ["fade_per_j", "cooling_s", "curvature"];
-        let parameters = names.iter().zip([1e-3, 20.0, 0.5]).map(|(name, x)| (name.to_string(), x)).collect();
-        model.extensions.push(Extension { id: "thermal_fade".into(), parameters });
+        let names = ["change_per_m", "scale_m"];
+        let parameters = names.iter().zip([1e-3, 20.0]).map(|(name, x)| (name.to_string(), x)).collect();
+        model.extensions.push(Extension { id: "wear_drift".into(), parameters });
         assert_eq!(ModelFile::parse("m.toml", &model.to_toml()).unwrap(), model);
     }
 

@@ -2,7 +2,8 @@
 //!
 //! Order of the friction channel: ring, amplifier, drift and crosstalk, delay, clipping. A ring among the
 //! effects stands in for the rig file's. Delay and clipping act on the samples, as steps of changing
-//! length have no common memory. The element is taken as cold and unworn at the first sample. Effects of pressure and drive do not act here.
+//! length have no common memory. The element is taken as cold and unworn at the first sample. Effects of
+//! pressure and drive do not act here.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
