@@ -1,8 +1,13 @@
 //! The contact: friction torque given measured motion and load, with the channels that measure it.
 
+pub mod analysis;
 pub mod baseline;
 pub mod bins;
+pub mod evidence;
 pub mod model;
+pub mod output;
 pub mod plan;
 pub mod problem;
 pub mod witness;
+
+pub use analysis::ContactAnalysis;

@@ -82,11 +82,14 @@ pub struct Problem {
     pub measured_nm: Vec<Vec<f64>>,
     /// Steps of each record's bins.
     pub plans: Vec<Plan>,
+    /// Steps of each record's samples.
+    sample_plans: Vec<Plan>,
     /// Expected standard deviation of the residual of each bin; NaN is masked.
     pub sigma_nm: Vec<Vec<f64>>,
     /// What the library knows about the records.
     pub scales: Scales,
     witness: Option<DriveWitness>,
+    holdout_witness: Option<DriveWitness>,
     fits: Mutex<HashMap<Combination, Arc<Fitted>>>,
 }
 
@@ -94,16 +97,18 @@ impl Problem {
     /// Prepares logs (training first), smooths inputs, fits the baseline and sets the weights.
     pub fn new(rig: &RigFile, file: &ModelFile, records: Vec<Record>) -> Result<Self, InputError> {
         let radius_m = rig.friction_radius_m;
-        let prepared: Vec<(Vec<Bin>, Plan)> = records
+        let prepared: Vec<(Vec<Bin>, (Plan, Plan))> = records
             .par_iter()
             .map(|record| {
                 let (speed, load) = record.inputs(None);
                 let bins = bins::adaptive(record, radius_m, &speed, &load);
                 let plan = Plan::new(record, &bins, radius_m, &speed, &load);
-                (bins, plan)
+                let samples = Plan::new(record, &bins::single(record), radius_m, &speed, &load);
+                (bins, (plan, samples))
             })
             .collect();
-        let (bins, plans): (Vec<Vec<Bin>>, Vec<Plan>) = prepared.into_iter().unzip();
+        let (bins, plans): (Vec<Vec<Bin>>, Vec<(Plan, Plan)>) = prepared.into_iter().unzip();
+        let (plans, sample_plans): (Vec<Plan>, Vec<Plan>) = plans.into_iter().unzip();
         let measured_nm = records
             .iter()
             .zip(&bins)
@@ -111,11 +116,12 @@ impl Problem {
             .collect();
         let baseline = ContactModel::new(file);
         let scales = scales(rig, &baseline, &records);
-        let training: Vec<&Record> = records.iter().filter(|r| r.role == Role::Train).collect();
-        let witness = DriveWitness::new(
-            &training,
-            &bins.iter().map(Vec::as_slice).collect::<Vec<_>>()[..training.len()],
-        );
+        let balance = |role: Role| {
+            let own = || records.iter().zip(&bins).filter(|(record, _)| record.role == role);
+            let (records, bins): (Vec<&Record>, Vec<&[Bin]>) = own().map(|(r, b)| (r, b.as_slice())).unzip();
+            DriveWitness::new(&records, &bins)
+        };
+        let (witness, holdout_witness) = (balance(Role::Train), balance(Role::Holdout));
         let mut problem = Self {
             rig: rig.clone(),
             baseline,
@@ -123,16 +129,18 @@ impl Problem {
             bins,
             measured_nm,
             plans,
+            sample_plans,
             records,
             scales,
             witness,
+            holdout_witness,
             fits: Mutex::new(HashMap::new()),
         };
         problem.sigma_nm = problem.weights(&problem.baseline.clone())?;
         let first = problem.fit(&Vec::new(), None).ok_or_else(|| {
             InputError::new("the baseline has no finite prediction for these logs").file(file.source.as_str())
         })?;
-        let fitted = problem.model(&first, 0);
+        let fitted = problem.model_with(&first, 0, 0.0);
         problem.sigma_nm = problem.weights(&fitted)?;
         problem.baseline = ContactModel { effects: Vec::new(), ..fitted };
         problem.scales.stiffness_n_per_m = problem.baseline.parameter("k_u_n_per_m").unwrap_or(3e4);
@@ -146,12 +154,40 @@ impl Problem {
         self.records.iter().filter(|record| record.role == Role::Train).count()
     }
 
-    /// Runs a model over a record.
+    /// Runs a model over the bins of a record.
     pub fn run(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
-        let record = &self.records[log];
-        let window = record.friction_nm.values.len().clamp(1, 20);
-        let first_nm = record.friction_nm.values[..window].iter().sum::<f64>() / window as f64;
-        model.run(&self.rig, &self.plans[log], first_nm)
+        model.run(&self.rig, &self.plans[log], self.first_nm(log))
+    }
+
+    /// Runs a model over the samples of a record.
+    pub fn run_samples(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
+        model.run(&self.rig, &self.sample_plans[log], self.first_nm(log))
+    }
+
+    /// What the friction channel shows when a record begins.
+    fn first_nm(&self, log: usize) -> f64 {
+        let values = &self.records[log].friction_nm.values;
+        let window = values.len().clamp(1, 20);
+        values.iter().take(window).sum::<f64>() / window as f64
+    }
+
+    /// The balance of torques at the disc for logs of a role, where M2's torque was logged.
+    pub fn witness(&self, role: Role) -> Option<&DriveWitness> {
+        match role {
+            Role::Train => self.witness.as_ref(),
+            Role::Holdout => self.holdout_witness.as_ref(),
+        }
+    }
+
+    /// Rows of a training log among the residuals of a fit.
+    pub fn rows_of(&self, log: usize) -> Option<std::ops::Range<usize>> {
+        let before: usize = self.bins[..log].iter().map(Vec::len).sum();
+        (log < self.training()).then(|| before..before + self.bins[log].len())
+    }
+
+    /// Rows of all training logs; those of the witness follow.
+    pub fn friction_rows(&self) -> usize {
+        self.bins[..self.training()].iter().map(Vec::len).sum()
     }
 
     /// Expected standard deviation of the residual of each sample, see above.
@@ -279,18 +315,22 @@ impl Problem {
         model
     }
 
-    fn model_with(&self, fitted: &Fitted, log: usize, origin: f64) -> ContactModel {
+    /// The fitted model of a log, with a given origin for a log that has none of its own.
+    pub fn model_with(&self, fitted: &Fitted, log: usize, origin: f64) -> ContactModel {
         self.assemble(&fitted.combination, &fitted.slots, &fitted.point.values, log, origin)
     }
 
-    /// The fitted model of a log. The origin of a log that is held out is the one thing fitted to it:
-    /// nothing else tells where on the disc its angle began.
-    pub fn model(&self, fitted: &Fitted, log: usize) -> ContactModel {
-        let plain = self.model_with(fitted, log, 0.0);
-        let needs_origin =
-            fitted.combination.iter().any(|(id, _)| effect(id).is_some_and(|e| e.origin().is_some()));
-        if !needs_origin || log < self.training() {
-            return plain;
+    /// Whether an effect of the combination has an origin in each log.
+    pub fn has_origin(&self, combination: &Combination) -> bool {
+        combination.iter().any(|(id, _)| effect(id).is_some_and(|e| e.origin().is_some()))
+    }
+
+    /// The origin of a log. That of a log that is held out is the one thing fitted to it: nothing else
+    /// tells where on the disc its angle began.
+    pub fn origin(&self, fitted: &Fitted, log: usize) -> f64 {
+        if !self.has_origin(&fitted.combination) || log < self.training() {
+            let own = fitted.slots.iter().position(|slot| slot.log == Some(log));
+            return own.map_or(0.0, |at| fitted.point.values[at]);
         }
         let loss = |origin: f64| -> f64 {
             let model = self.model_with(fitted, log, origin);
@@ -308,7 +348,7 @@ impl Problem {
             origin = best((-4..=4).map(|k| origin + width * 0.25 * f64::from(k)).collect());
             width *= 0.25;
         }
-        self.model_with(fitted, log, origin)
+        origin
     }
 
     /// Residuals of the training logs, then those of the witness.
@@ -581,11 +621,6 @@ impl Problem {
     /// Effects that these records and this baseline allow, with their forms.
     pub fn conceivable(&self) -> Vec<&'static dyn ContactEffect> {
         LIBRARY.into_iter().filter(|effect| effect.applies(&self.baseline, &self.scales)).collect()
-    }
-
-    /// Names of the witnesses after the friction channel.
-    pub fn has_drive_witness(&self) -> bool {
-        self.witness.is_some()
     }
 }
 
