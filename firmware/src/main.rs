@@ -45,7 +45,7 @@ async fn main(spawner: Spawner) {
     watchdog::start();
 
     let Some(buffers) = memory::take_link_buffers() else { panic!("the link's buffers are taken") };
-    let (tx, rx) = match link::open(board.link, &mut buffers.received) {
+    let (tx, rx) = match link::open(board.link) {
         Ok(port) => port,
         Err(error) => panic!("the link's rate is not possible: {error:?}"),
     };

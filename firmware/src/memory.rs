@@ -18,7 +18,7 @@
 //! either made of atomics, for which any bits are a value, or cleared here before it is given away.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, AtomicU32, Ordering};
 use rig_link::capture::CaptureRow;
 
 /// Channels of one scan of the analogue inputs.
@@ -41,11 +41,16 @@ pub static CAPTURE_WORDS: [AtomicU32; CAPTURE_ROWS * ROW_WORDS] =
 #[unsafe(link_section = ".kept.words")]
 pub static KEPT_WORDS: [AtomicU32; 64] = [const { AtomicU32::new(0) }; 64];
 
+/// Size of the ring for received bytes: 20 ms at full rate.
+pub const RECEIVED_BYTES: usize = 4096;
+
+/// Received bytes, a ring, written by DMA1 stream 1.
+#[unsafe(link_section = ".dma.received")]
+pub static RECEIVED: [AtomicU8; RECEIVED_BYTES] = [const { AtomicU8::new(0) }; RECEIVED_BYTES];
+
 /// Buffers of the serial link.
 #[repr(C, align(32))]
 pub struct LinkBuffers {
-    /// Ring the DMA writes received bytes into: 20 ms at full rate.
-    pub received: [u8; 4096],
     /// What the DMA sends.
     pub sending: [u8; 2048],
 }
@@ -57,8 +62,7 @@ struct LinkMemory(UnsafeCell<LinkBuffers>);
 unsafe impl Sync for LinkMemory {}
 
 #[unsafe(link_section = ".dma.link")]
-static LINK_MEMORY: LinkMemory =
-    LinkMemory(UnsafeCell::new(LinkBuffers { received: [0; 4096], sending: [0; 2048] }));
+static LINK_MEMORY: LinkMemory = LinkMemory(UnsafeCell::new(LinkBuffers { sending: [0; 2048] }));
 
 /// The buffers of the serial link, cleared; none from the second call on.
 #[must_use]

@@ -1,21 +1,23 @@
 //! The link to the host on USART3, 2 Mbaud: one task receives and carries out, one sends.
 //!
-//! Received bytes come through a ring the DMA fills by itself; 4 KB are 20 ms. What goes out is gathered
+//! Received bytes come through a ring the DMA fills by itself (`ring.rs`). What goes out is gathered
 //! into one DMA transfer: answers and events first, then telemetry. Telemetry that finds no room is counted
 //! where the tick offers it.
 
 mod operator;
 mod receive;
+mod ring;
 mod send;
 
 pub use operator::{Identity, Operator};
 pub use receive::receive;
+pub use ring::Ring;
 pub use send::send;
 
 use crate::board::LinkPort;
 use core::sync::atomic::AtomicU32;
 use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{Config, ConfigError, InterruptHandler, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::usart::{Config, ConfigError, InterruptHandler, Uart, UartTx};
 use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_sync::blocking_mutex::raw::ThreadModeRawMutex;
 use embassy_sync::channel::Channel;
@@ -39,13 +41,10 @@ pub static LINE_ERRORS: AtomicU32 = AtomicU32::new(0);
 ///
 /// # Errors
 /// The rate cannot be made from the port's clock.
-pub fn open(
-    port: LinkPort,
-    ring: &'static mut [u8],
-) -> Result<(UartTx<'static, Async>, RingBufferedUartRx<'static>), ConfigError> {
+pub fn open(port: LinkPort) -> Result<(UartTx<'static, Async>, Ring), ConfigError> {
     let mut config = Config::default();
     config.baudrate = rig_link::BAUD;
     let uart = Uart::new(port.usart, port.rx, port.tx, port.tx_dma, port.rx_dma, Irqs, config)?;
     let (tx, rx) = uart.split();
-    Ok((tx, rx.into_ring_buffered(ring)))
+    Ok((tx, Ring::start(rx)))
 }

@@ -1,28 +1,19 @@
 //! Bytes to requests, requests to the operator, answers to the outgoing queue.
 
-use super::{FRAMES_REJECTED, LINE_ERRORS, OUTGOING, Operator};
+use super::ring::Ring;
+use super::{FRAMES_REJECTED, OUTGOING, Operator};
 use crate::tick;
 use core::sync::atomic::Ordering::Relaxed;
-use embassy_stm32::usart::RingBufferedUartRx;
 use rig_link::frame::Receiver;
 use rig_link::message::{Message, Request};
 
 /// Receives for ever.
 #[embassy_executor::task]
-pub async fn receive(mut port: RingBufferedUartRx<'static>, mut operator: Operator) {
+pub async fn receive(mut port: Ring, mut operator: Operator) {
     let mut receiver = Receiver::new();
     let mut bytes = [0; 256];
     loop {
-        let count = match port.read(&mut bytes).await {
-            Ok(count) => count,
-            Err(error) => {
-                LINE_ERRORS.store(LINE_ERRORS.load(Relaxed).saturating_add(1), Relaxed);
-                defmt::warn!("link: {}", error);
-                receiver.discard();
-                FRAMES_REJECTED.store(receiver.rejected(), Relaxed);
-                continue;
-            }
-        };
+        let count = port.read(&mut bytes).await;
         for byte in bytes.iter().take(count) {
             let Some(received) = receiver.push::<Request>(*byte) else { continue };
             match received {

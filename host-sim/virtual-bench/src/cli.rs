@@ -1,11 +1,12 @@
 //! The command line of `cargo virtual-bench`.
 
+use crate::campaign;
 use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{self, Done, Request};
 use crate::firmware_build;
 use clap::{ArgGroup, Parser};
-use host_sim::cli::common::SetArgs;
+use host_sim::cli::common::{SetArgs, say};
 use host_sim::cli::progress::Progress;
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
@@ -29,6 +30,7 @@ const BAD_INPUT: u8 = 2;
     after_long_help = "\
 Examples:
   cargo virtual-bench --experiment fig20 --out target/bench/fig20
+  cargo virtual-bench --faults
   cargo virtual-bench --experiment fig20 --observer model-extended.toml --out target/bench/extended
 
 An experiment writes log.csv (as the host tool recorded it from the serial link), capture.csv (two seconds at the full
@@ -40,6 +42,9 @@ struct Cli {
     /// fig18 … fig23, or an experiment file (TOML)
     #[arg(long, value_name = "NAME|FILE.toml", group = "what", requires = "out")]
     experiment: Option<String>,
+    /// Make everything go wrong that can, and see that the firmware ends it
+    #[arg(long, group = "what")]
+    faults: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -113,8 +118,24 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<(), BenchError> {
+    if cli.faults {
+        return run_faults(&firmware(cli.elf)?);
+    }
     let experiment = cli.experiment.clone().unwrap_or_default();
     run_experiment(cli, &experiment)
+}
+
+fn run_faults(firmware: &Firmware) -> Result<(), BenchError> {
+    let verdicts = campaign::run(firmware, &std::env::temp_dir(), &mut |verdict| {
+        eprintln!("{}: {}", verdict.name, if verdict.held() { "ok" } else { "FAILED" });
+    })?;
+    say(&campaign::table(&verdicts));
+    let failed = verdicts.iter().filter(|verdict| !verdict.held()).count();
+    if failed == 0 {
+        Ok(())
+    } else {
+        Err(BenchError::Check(format!("{failed} of {} faults", verdicts.len())))
+    }
 }
 
 fn firmware(elf: Option<PathBuf>) -> Result<Firmware, BenchError> {

@@ -27,6 +27,7 @@ pub(crate) enum Question {
     EndMeasuring,
     Outputs,
     WrongPins,
+    Memory { address: u64, length: u64 },
     Snapshot,
 }
 
@@ -37,6 +38,7 @@ pub(crate) enum ToDesk {
     Measured(Box<Ticks>),
     Outputs(DriveInputs),
     WrongPins(Vec<String>),
+    Memory(Vec<u8>),
     Done(Result<(), String>),
 }
 
@@ -158,6 +160,17 @@ impl Desk {
     pub fn wrong_pins(&mut self) -> Result<Vec<String>, BenchError> {
         match self.ask(Question::WrongPins)? {
             ToDesk::WrongPins(wrong) => Ok(wrong),
+            _ => Err(over()),
+        }
+    }
+
+    /// Bytes of the chip's memory, as a debugger reads them; `length` is a multiple of eight.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn memory(&mut self, address: u64, length: u64) -> Result<Vec<u8>, BenchError> {
+        match self.ask(Question::Memory { address, length })? {
+            ToDesk::Memory(bytes) => Ok(bytes),
             _ => Err(over()),
         }
     }

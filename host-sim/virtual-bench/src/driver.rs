@@ -33,7 +33,7 @@ const ENDLESS_LOOP: u64 = 0xE7FE;
 pub(crate) struct Addresses {
     rtt_block: u64,
     tick_handler: u64,
-    thread_timer_handler: u64,
+    low_handler: u64,
     digest: [u8; 32],
 }
 
@@ -42,7 +42,7 @@ impl Addresses {
         Self {
             rtt_block: firmware.rtt_block,
             tick_handler: firmware.tick_handlers[0],
-            thread_timer_handler: firmware.thread_timer_handler,
+            low_handler: firmware.low_handler,
             digest: firmware.digest,
         }
     }
@@ -176,16 +176,28 @@ impl BenchDriver {
             Action::LinkSilent(silent) => serial::silence(part, silent),
             Action::LinkGarbled(per_million) => serial::garble(part, per_million, 1),
             Action::Power(on) => {
-                self.drain_log(host);
                 part.power(stop.at, on);
+                if on {
+                    // Now, while the core is still held: afterwards its start-up may have run.
+                    lose_memory(session, host);
+                    self.rtt.restarted(host);
+                } else {
+                    self.drain_log(host);
+                }
             }
             Action::ResetPin => {
                 self.drain_log(host);
                 session.reset_by_pin(stop.at, stop.instruction_count, host);
                 return;
             }
+            Action::FlashWord(address, bytes) => {
+                for (at, eight) in (address..).step_by(8).zip(bytes.as_chunks().0) {
+                    // It is flash, which the bench may program as the models do.
+                    let _ = host.program(at, Width::W64, u64::from_le_bytes(*eight));
+                }
+            }
             Action::HangTick => self.patch(self.addresses.tick_handler, host),
-            Action::HangThreads => self.patch(self.addresses.thread_timer_handler, host),
+            Action::HangThreads => self.patch(self.addresses.low_handler, host),
         }
         self.show_outside(&mut session.board_mut().part, stop.at);
     }
@@ -208,16 +220,15 @@ impl BenchDriver {
     fn restarted(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, at: VirtualNanos) {
         let new = session.resets().get(self.resets_seen..).unwrap_or_default().to_vec();
         self.resets_seen = session.resets().len();
-        if new.iter().any(|reset| reset.cause == ResetCause::PowerOn) {
-            lose_memory(session, host);
-        } else {
+        let powered_on = new.iter().any(|reset| reset.cause == ResetCause::PowerOn);
+        if !powered_on {
             self.drain_log(host);
+            self.rtt.restarted(host);
         }
         if let Some((address, original)) = self.patched.take() {
             // It was programmed there before.
             let _ = host.program(address, Width::W16, original);
         }
-        self.rtt.restarted(host);
         self.meter.restarted();
         self.record.restarted(&new);
         self.note_outputs(&mut session.board_mut().part, at);
@@ -275,6 +286,13 @@ impl BenchDriver {
             Question::EndMeasuring => ToDesk::Measured(Box::new(self.meter.end())),
             Question::Outputs => ToDesk::Outputs(Self::outputs(part, stop.at)),
             Question::WrongPins => ToDesk::WrongPins(pins::wrong_modes(part, stop.at)),
+            Question::Memory { address, length } => ToDesk::Memory(
+                (address..address + length)
+                    .step_by(8)
+                    .map_while(|at| host.read(at, Width::W64).ok())
+                    .flat_map(u64::to_le_bytes)
+                    .collect(),
+            ),
             Question::Snapshot => {
                 let taken = snapshot::take(session, host, stop, &self.addresses.digest, &NothingMore);
                 ToDesk::Done(taken.map_err(|error| error.to_string()).map(|taken| {
@@ -363,6 +381,7 @@ impl Driver<RigBoard> for BenchDriver {
         }
         let part = &mut session.board_mut().part;
         self.show_outside(part, stop.at);
+        self.note_outputs(part, stop.at);
         self.step_plant(part, stop.at);
         self.received.extend(serial::take_received(part));
         self.record.last_at = stop.at.0;

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Handlers that run the control tick; the first one that is reached opens it.
 const TICK_HANDLERS: [&str; 2] = ["DMA1_STREAM7", "TIM6_DAC"];
-/// The handler of the executor's time.
-const THREAD_TIMER_HANDLER: &str = "TIM3";
+/// A handler between the threads and the control tick: that of the link's DMA.
+const LOW_HANDLER: &str = "DMA1_STREAM0";
 
 /// The ELF and what was found in it.
 #[derive(Debug)]
@@ -26,8 +26,8 @@ pub struct Firmware {
     pub rtt_block: u64,
     /// Addresses of the first instructions of the control tick's interrupt handlers.
     pub tick_handlers: [u64; 2],
-    /// Address of the first instruction of the handler that wakes the threads.
-    pub thread_timer_handler: u64,
+    /// Address of the first instruction of a handler the control tick interrupts, and which interrupts the threads.
+    pub low_handler: u64,
 }
 
 impl Firmware {
@@ -48,10 +48,10 @@ impl Firmware {
         };
         let rtt_block = address("_SEGGER_RTT")?;
         let tick_handlers = [address(TICK_HANDLERS[0])?, address(TICK_HANDLERS[1])?];
-        let thread_timer_handler = address(THREAD_TIMER_HANDLER)?;
+        let low_handler = address(LOW_HANDLER)?;
         let images = vec![Image::new(path, bytes.clone(), None).map_err(|error| bad(error.to_string()))?];
         let digest = image::digest(&images, None);
         let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Self { bytes, sha256, images, digest, rtt_block, tick_handlers, thread_timer_handler })
+        Ok(Self { bytes, sha256, images, digest, rtt_block, tick_handlers, low_handler })
     }
 }

@@ -66,7 +66,11 @@ impl Request {
         })
     }
 
-    fn plant(&self) -> Result<HostPlant, BenchError> {
+    /// The plant behind the pins.
+    ///
+    /// # Errors
+    /// A parameter out of range.
+    pub fn plant(&self) -> Result<HostPlant, BenchError> {
         let parameters = PlantParameters::from_files(&self.rig, &self.model, &self.experiment.plant);
         Ok(HostPlant::new(&parameters, self.experiment.seed)?)
     }

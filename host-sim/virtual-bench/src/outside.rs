@@ -40,6 +40,9 @@ pub trait PlantSide: Send {
     fn duplicate(&self) -> Box<dyn PlantSide>;
 }
 
+/// Bytes of a word of the chip's flash, which is programmed whole.
+pub const FLASH_WORD: usize = 32;
+
 /// Something done to the rig, at the start of a control period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action {
@@ -61,12 +64,13 @@ pub enum Action {
     LinkGarbled(u32),
     /// The chip's supply is cut or comes back. Memory other than flash is lost.
     Power(bool),
+    /// A flash word is found so after a power cut: at this address, these bytes.
+    FlashWord(u64, [u8; FLASH_WORD]),
     /// The reset pin is pulled.
     ResetPin,
     /// The control tick's handler becomes an endless loop, until the next reset.
     HangTick,
-    /// The handler of the executor's timer becomes an endless loop, until the next reset: threads starve,
-    /// the tick goes on.
+    /// The handler of the link's DMA becomes an endless loop, until the next reset: threads starve, the tick goes on.
     HangThreads,
 }
 

@@ -70,8 +70,9 @@ impl Encoder {
         }
     }
 
-    /// Takes one reading of the counter.
-    pub(crate) fn step(&self, state: &mut EncoderState, raw: u32) -> EncoderStep {
+    /// Takes one reading of the counter. Where the time since the last one is not `regular`, one period, the step says
+    /// nothing of the speed: it counts, and is no jump.
+    pub(crate) fn step(&self, state: &mut EncoderState, raw: u32, regular: bool) -> EncoderStep {
         if !state.primed {
             *state = EncoderState { primed: true, raw, ..EncoderState::default() };
             return EncoderStep { counts: 0, jump: false };
@@ -79,10 +80,13 @@ impl Encoder {
         let counts = signed_difference(raw, state.raw, self.unused_bits);
         let counts = if self.reversed { counts.wrapping_neg() } else { counts };
         let change = counts.wrapping_sub(state.step);
-        let jump = counts.unsigned_abs() > self.most_counts.unsigned_abs()
-            || change.unsigned_abs() > self.most_change.unsigned_abs();
+        let jump = regular
+            && (counts.unsigned_abs() > self.most_counts.unsigned_abs()
+                || change.unsigned_abs() > self.most_change.unsigned_abs());
         state.raw = raw;
-        state.step = counts;
+        if regular {
+            state.step = counts;
+        }
         state.count = state.count.wrapping_add(i64::from(counts));
         self.turn(state, counts);
         EncoderStep { counts, jump }
@@ -155,11 +159,11 @@ mod tests {
         let mask = u32::MAX >> (32 - counter_bits);
         let mut state = EncoderState::default();
         let mut truth = 0_i64;
-        encoder.step(&mut state, start & mask);
+        encoder.step(&mut state, start & mask, true);
         for &step in steps {
             truth += i64::from(step);
             let raw = (i64::from(start) + truth) as u32 & mask;
-            assert_eq!(encoder.step(&mut state, raw).counts, step);
+            assert_eq!(encoder.step(&mut state, raw, true).counts, step);
             assert_eq!(state.count(), truth);
             let n = i64::from(encoder.counts_per_rev);
             assert_eq!(i64::from(state.in_turn), truth.rem_euclid(n));
@@ -192,7 +196,7 @@ mod tests {
             let mut raw = 0_u32;
             for step in std::iter::once(0).chain(steps) {
                 raw = raw.wrapping_add_signed(step);
-                prop_assert_eq!(plain.step(&mut a, raw).counts, -turned.step(&mut b, raw).counts);
+                prop_assert_eq!(plain.step(&mut a, raw, true).counts, -turned.step(&mut b, raw, true).counts);
                 prop_assert_eq!(a.count(), -b.count());
             }
         }
@@ -202,7 +206,7 @@ mod tests {
     fn the_first_reading_is_the_origin() {
         let encoder = encoder(32);
         let mut state = EncoderState::default();
-        assert_eq!(encoder.step(&mut state, 0xdead_beef), EncoderStep { counts: 0, jump: false });
+        assert_eq!(encoder.step(&mut state, 0xdead_beef, true), EncoderStep { counts: 0, jump: false });
         assert_eq!(state.count(), 0);
     }
 
@@ -211,13 +215,13 @@ mod tests {
         // 240 counts a tick, 3.6e8 ticks: too many to run one by one, so each step is a quarter of a turn.
         let encoder = encoder(32);
         let mut state = EncoderState::default();
-        encoder.step(&mut state, 0);
+        encoder.step(&mut state, 0, true);
         let mut raw = 0_u32;
         for _ in 0..720_000 {
             raw = raw.wrapping_add(120_000);
-            encoder.step(&mut state, raw);
+            encoder.step(&mut state, raw, true);
         }
-        encoder.step(&mut state, raw.wrapping_add(1));
+        encoder.step(&mut state, raw.wrapping_add(1), true);
         assert_eq!(state.count(), 720_000 * 120_000 + 1);
         assert_eq!(state.turns, 180_000);
         // One count is 1/480 000 of a turn; 2⁻³² of a turn is 0.0001 counts.
@@ -232,8 +236,8 @@ mod tests {
             [(120_000_u32, 0.25_f64), (0_u32.wrapping_sub(120_000), -0.25), (479_999, 479_999.0 / 480_000.0)]
         {
             let mut state = EncoderState::default();
-            encoder.step(&mut state, 0);
-            encoder.step(&mut state, raw);
+            encoder.step(&mut state, 0, true);
+            encoder.step(&mut state, raw, true);
             let turns: f64 = encoder.turns(&state).to_num();
             assert!((turns - expected).abs() < 1e-9, "{turns} {expected}");
             assert!((f64::from(encoder.angle_rad(&state)) - expected * f64::from(TAU)).abs() < 1e-6);
@@ -246,14 +250,14 @@ mod tests {
         let mut state = EncoderState::default();
         let mut raw = 0_u32;
         let mut step = 0;
-        encoder.step(&mut state, raw);
+        encoder.step(&mut state, raw, true);
         // 1000 rad/s², far more than 8 N·m give 0.02 kg·m², up to 300 rpm.
         while step < 240 {
             step += 1;
             raw = raw.wrapping_add(step);
-            assert!(!encoder.step(&mut state, raw).jump, "at {step} counts a tick");
+            assert!(!encoder.step(&mut state, raw, true).jump, "at {step} counts a tick");
         }
-        assert!(encoder.step(&mut state, raw).jump);
+        assert!(encoder.step(&mut state, raw, true).jump);
     }
 
     #[test]
@@ -261,10 +265,10 @@ mod tests {
         // 60 rad/s are 458 counts a tick, and 3 for sampling.
         let (encoder, mut state) = (encoder(32), EncoderState::default());
         let mut raw = 0_u32;
-        encoder.step(&mut state, raw);
+        encoder.step(&mut state, raw, true);
         let first = (1..1000_u32).find(|step| {
             raw = raw.wrapping_add(*step);
-            encoder.step(&mut state, raw).jump
+            encoder.step(&mut state, raw, true).jump
         });
         assert_eq!(first, Some(462));
     }

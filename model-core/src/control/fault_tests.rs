@@ -126,6 +126,24 @@ fn running_at_30_rpm() -> Bench {
     bench
 }
 
+#[test]
+fn a_scan_that_does_not_come_at_speed_is_no_jump_of_an_encoder() {
+    let mut bench = running_at_30_rpm();
+    let mut n = 0;
+    bench.tamper = Some(Box::new(move |s: &mut Samples| {
+        n += 1;
+        if n == 5 {
+            // Such a tick comes at the end of its period: 23 of the next 24 counts are there already.
+            s.adc_fresh = false;
+            s.m2_count = s.m2_count.wrapping_add(23);
+        }
+    }));
+    for _ in 0..1000 {
+        let record = bench.tick().record;
+        assert_eq!((record.mode, record.fault), (Mode::Running, None));
+    }
+}
+
 /// Nothing moves by itself after the cause is gone, and the way back takes clearing, the switch and a command.
 fn comes_back_only_by_hand(bench: &mut Bench, fault: Fault) {
     for _ in 0..500 {

@@ -64,6 +64,7 @@ struct MeasuringState {
     m1_watch: SprungWatchState,
     m2_watch: FreeWatchState,
     at_rest: bool,
+    late: bool,
 }
 
 /// Samples of one tick in SI units.
@@ -89,13 +90,19 @@ impl MeasuringState {
             m1_watch: SprungWatchState::default(),
             m2_watch: FreeWatchState::default(),
             at_rest: false,
+            late: false,
         }
     }
 
     fn step(&mut self, config: &ControlConfig, samples: &Samples) -> Measured {
         let (s, adc) = (&config.settings, &samples.adc);
-        let m1 = config.m1_encoder.step(&mut self.m1_encoder, samples.m1_count);
-        let m2 = config.m2_encoder.step(&mut self.m2_encoder, samples.m2_count);
+        // A tick that nothing or not its own scan started read the encoders late: the times to its neighbours are no
+        // period.
+        let late = samples.deadline_missed || !(samples.adc_fresh || samples.adc_overrun);
+        let was_late = core::mem::replace(&mut self.late, late);
+        let regular = !(late || was_late);
+        let m1 = config.m1_encoder.step(&mut self.m1_encoder, samples.m1_count, regular);
+        let m2 = config.m2_encoder.step(&mut self.m2_encoder, samples.m2_count, regular);
         let m2_speed_rad_s = config.speed.step(&mut self.speed, m2.counts);
         let m1_torque_nm = (f32::from(adc.m1_torque) - s.m1.monitor_zero_code) * s.m1.monitor_nm_per_code;
         let m2_torque_nm = (f32::from(adc.m2_torque) - s.m2.monitor_zero_code) * s.m2.monitor_nm_per_code;

@@ -1,0 +1,245 @@
+//! Faults of the rig, its wires, its chip: one entry each.
+
+use super::witness::Witness;
+use super::{PROMISED_NS, Verdict};
+use crate::bench;
+use crate::defmt_log;
+use crate::desk::Desk;
+use crate::driver::PERIOD;
+use crate::elf::Firmware;
+use crate::error::BenchError;
+use crate::outside::Action;
+use crate::part::Motor;
+use crate::part::encoder_timer::Line;
+use crate::record::Saved;
+use host_sim::link::words;
+use model_core::control::{ControlSettings, Fault};
+use rig_link::message::{Answer, Command, KeptMessage, ResetCause};
+use std::path::Path;
+
+/// The watchdog's count: 16 counts of 4 LSI cycles (firmware/src/watchdog.rs), and one LSI cycle of phase.
+const WATCHDOG_NS: u64 = 2_000_000 + 31_250;
+/// The tick feeds the watchdog as long as the threads were heard within this time (firmware/src/watchdog.rs).
+const THREADS_NS: u64 = 500_000_000;
+/// A voltage the amplifier of a bridge clips to (99 % of the range), and what a broken or shorted wire is pulled to.
+const CLIPPED_MICROVOLT: u32 = 3_267_500;
+const OPEN_MICROVOLT: u32 = 3_299_000;
+const SHORT_MICROVOLT: u32 = 1_000;
+/// Time to watch after the outputs became safe, and after a restart.
+const AFTERWARDS_NS: u64 = 300_000_000;
+
+/// How a fault is told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Told {
+    /// The supervisor latches it and says so.
+    Latched(Fault),
+    /// One of these: which one comes first depends on the phase of the motion.
+    OneOf(&'static [Fault]),
+    /// The chip restarts for this cause, and latches this fault then.
+    Restart(ResetCause, Option<Fault>),
+}
+
+/// One fault.
+#[derive(Debug, Clone)]
+pub(super) struct Case {
+    name: &'static str,
+    actions: Vec<Action>,
+    /// Done so long after the fault, e.g. the supply coming back.
+    later: Vec<(u64, Action)>,
+    known_ns: u64,
+    told: Told,
+    /// The host goes silent with the fault.
+    silent: bool,
+    /// And hears nothing.
+    deaf: bool,
+}
+
+fn case(name: &'static str, actions: &[Action], known_ns: u64, told: Told) -> Case {
+    Case { name, actions: actions.to_vec(), later: Vec::new(), known_ns, told, silent: false, deaf: false }
+}
+
+/// The faults, and after what time each can be known by the settings the firmware has.
+pub(super) fn all() -> Vec<Case> {
+    let settings = ControlSettings::default();
+    let ticks = |ticks: u32| u64::from(ticks) * PERIOD;
+    let seconds = |seconds: f32| (f64::from(seconds) * 1e9) as u64;
+    // The first sample after the fault is one, so n in a row are there n − 1 periods later.
+    let bridge = ticks(settings.friction_bridge.persistence_ticks - 1);
+    let held = |index: usize, microvolt: u32| [Action::AnalogueInput(index, Some(microvolt))];
+    let stop = Action::EmergencyStop(true);
+    let mut all = vec![
+        case("emergency stop pressed", &[stop], 0, Told::Latched(Fault::EmergencyStop)),
+        Case {
+            later: vec![(5_000_000, Action::EmergencyStop(false))],
+            ..case("emergency stop tapped for 5 ms", &[stop], 0, Told::Latched(Fault::EmergencyStop))
+        },
+        case(
+            "M1 drive fault",
+            &[Action::DriveHealthy(Motor::M1, false)],
+            0,
+            Told::Latched(Fault::M1DriveFault),
+        ),
+        case(
+            "M2 drive fault",
+            &[Action::DriveHealthy(Motor::M2, false)],
+            0,
+            Told::Latched(Fault::M2DriveFault),
+        ),
+    ];
+    for (line, level, name) in [
+        (Line::A, false, "M2 encoder line A stuck low"),
+        (Line::A, true, "M2 encoder line A stuck high"),
+        (Line::B, false, "M2 encoder line B stuck low"),
+        (Line::B, true, "M2 encoder line B stuck high"),
+    ] {
+        // At speed a dead line is a jump of the speed, seen in the first whole period without counts.
+        let told = Told::OneOf(&[Fault::M2EncoderJump, Fault::M2EncoderNoTorque]);
+        all.push(case(name, &[Action::EncoderLine(Motor::M2, line, Some(level))], PERIOD, told));
+    }
+    for (index, microvolt, name, fault) in [
+        (0, CLIPPED_MICROVOLT, "friction bridge saturated", Fault::FrictionBridgeSaturated),
+        (0, OPEN_MICROVOLT, "friction bridge open", Fault::FrictionBridgeOpen),
+        (0, SHORT_MICROVOLT, "friction bridge shorted", Fault::FrictionBridgeShort),
+        (1, OPEN_MICROVOLT, "normal-force bridge open", Fault::NormalBridgeOpen),
+    ] {
+        all.push(case(name, &held(index, microvolt), bridge, Told::Latched(fault)));
+    }
+    // A normal force near the bridge's end is an over-force too, and both need two samples.
+    let clipped = Told::OneOf(&[Fault::NormalBridgeSaturated, Fault::OverForce]);
+    all.push(case("normal-force bridge saturated", &held(1, CLIPPED_MICROVOLT), bridge, clipped));
+    let supply_low = seconds(settings.supply.persistence_s);
+    all.push(case("supply down to 18 V", &held(4, 1_636_000), supply_low, Told::Latched(Fault::SupplyLow)));
+    // A scan that does not come is missed at the end of its period.
+    let stalled = ticks(settings.timing.adc_stall_ticks);
+    all.push(case(
+        "ADC starts no more scans",
+        &[Action::AdcStalled(true)],
+        stalled,
+        Told::Latched(Fault::AdcStalled),
+    ));
+    let silence = seconds(settings.timing.link_timeout_s);
+    all.push(Case { silent: true, ..case("host silent", &[], silence, Told::Latched(Fault::LinkLost)) });
+    all.push(Case {
+        silent: true,
+        deaf: true,
+        // The line is whole again so that the reason can be told.
+        later: vec![(silence + 100_000_000, Action::LinkSilent(false))],
+        ..case("serial line cut", &[Action::LinkSilent(true)], silence, Told::Latched(Fault::LinkLost))
+    });
+    all.push(case(
+        "control tick hangs",
+        &[Action::HangTick],
+        WATCHDOG_NS,
+        Told::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
+    ));
+    all.push(case(
+        "threads hang, the tick goes on",
+        &[Action::HangThreads],
+        THREADS_NS + WATCHDOG_NS,
+        Told::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
+    ));
+    all.push(case("reset pin pulled", &[Action::ResetPin], 0, Told::Restart(ResetCause::Pin, None)));
+    all.push(Case {
+        later: vec![(50_000_000, Action::Power(true))],
+        ..case("power cut for 50 ms", &[Action::Power(false)], 0, Told::Restart(ResetCause::PowerOn, None))
+    });
+    all
+}
+
+/// What the operator saw.
+struct Seen {
+    at_ns: u64,
+    witness: Witness,
+    hello: Answer,
+    kept: Option<KeptMessage>,
+}
+
+fn operate(desk: &mut Desk, case: &Case) -> Result<Seen, BenchError> {
+    let mut witness = Witness::new();
+    // A few periods of company first: the host of before is gone.
+    witness.listen(desk, desk.now_ns() + 5_000_000)?;
+    witness.lively = !case.silent;
+    let at_ns = desk.now_ns();
+    for action in &case.actions {
+        desk.act(*action)?;
+    }
+    for (after_ns, action) in &case.later {
+        witness.listen(desk, at_ns + after_ns)?;
+        desk.act(*action)?;
+    }
+    witness.listen(desk, at_ns + case.known_ns + PROMISED_NS + AFTERWARDS_NS)?;
+    witness.lively = true;
+    let hello = witness.ask(desk, &Command::Hello)?;
+    // Nobody at the rig, the arm switch still on: nothing may move by itself. A health record comes each 0.1 s.
+    witness.listen(desk, desk.now_ns() + AFTERWARDS_NS)?;
+    let kept = match witness.ask(desk, &Command::KeptMessage)? {
+        Answer::Kept(kept) => kept,
+        _ => None,
+    };
+    Ok(Seen { at_ns, witness, hello, kept })
+}
+
+/// Lets a fault happen, and judges.
+pub(super) fn verdict(
+    firmware: &Firmware,
+    running: &Saved,
+    scratch: &Path,
+    case: &Case,
+) -> Result<Verdict, BenchError> {
+    let outcome = bench::run_on(firmware, running, scratch, |desk| operate(desk, case))?;
+    let (seen, record) = (outcome.operator, outcome.record);
+    let log = defmt_log::decode(&firmware.bytes, &record.log)?;
+    let mut problems = Vec::new();
+    let mut say = |wrong: bool, problem: String| {
+        if wrong {
+            problems.push(problem);
+        }
+    };
+    say(
+        record.outputs.first().is_none_or(|(_, outputs)| outputs.is_safe()),
+        "the rig was not running".to_owned(),
+    );
+    // From power-up on the record holds only changes, so what is unsafe after this instant is unsafe for good.
+    let safe_ns = record.safe_for_good_from(seen.at_ns).map(|at| at - seen.at_ns);
+    let limit = case.known_ns + PROMISED_NS;
+    say(safe_ns.is_none_or(|safe| safe > limit), format!("outputs are not safe within {} µs", limit / 1000));
+    let health = seen.witness.health.unwrap_or_default();
+    let mut said = health.fault;
+    let faults: &[Fault] = match &case.told {
+        Told::Latched(fault) | Told::Restart(_, Some(fault)) => std::slice::from_ref(fault),
+        Told::OneOf(faults) => faults,
+        Told::Restart(_, None) => &[],
+    };
+    // What happens while the line is cut is not heard; health tells it later.
+    let told = |fault: &&Fault| seen.witness.heard_of(fault.number()) || case.deaf && said == fault.number();
+    if let Some(fault) = faults.iter().find(told) {
+        said = fault.number();
+        let logged = log.lines.iter().any(|line| line.contains("error") && line.contains(fault.sentence()));
+        say(!logged, format!("the log does not say: {}", fault.sentence()));
+        say(health.fault != fault.number(), format!("its health says {}", words::fault(health.fault)));
+    } else if !faults.is_empty() {
+        problems.push(format!("the link tells of none of {faults:?} but of {:?}", seen.witness.events));
+    }
+    let mut text = if said == 0 { "disabled".to_owned() } else { words::fault(said) };
+    if let Told::Restart(cause, _) = case.told {
+        match &seen.hello {
+            Answer::Hello(hello) if hello.reset == cause => {
+                text = format!("started by {cause:?}; {text}");
+            }
+            other => problems.push(format!("it does not say that {cause:?} restarted it: {other:?}")),
+        }
+        let logged = log.lines.iter().any(|line| line.contains(&format!("start after {cause:?}")));
+        if !logged {
+            problems.push(format!("the log does not say that {cause:?} restarted it"));
+        }
+    } else if !record.restarts.is_empty() {
+        problems.push(format!("it restarted: {:?}", record.restarts));
+    }
+    if let Some(kept) = &seen.kept {
+        problems.push(format!("it kept a message: {}", words::kept(kept, 10_000)));
+    }
+    if log.malformed > 0 {
+        problems.push(format!("{} frames of the log could not be decoded", log.malformed));
+    }
+    Ok(Verdict { name: case.name, known_ns: case.known_ns, safe_ns, said: text, problems })
+}

@@ -1,0 +1,89 @@
+//! The host on the other end of the link during a fault: keeps the rig company, and remembers what it hears.
+
+use crate::desk::Desk;
+use crate::error::BenchError;
+use host_sim::link::client::Client;
+use rig_link::message::{Answer, Command, EventKind, EventMessage, Message};
+use rig_link::telemetry::Health;
+
+/// Time between two signs of life: a fifth of the rig's patience.
+const ALIVE_NS: u64 = 100_000_000;
+/// Longest wait for an answer.
+const PATIENCE_NS: u64 = 1_000_000_000;
+
+/// The host.
+#[derive(Debug)]
+pub(super) struct Witness {
+    client: Client,
+    alive_at: u64,
+    /// Sends signs of life.
+    pub(super) lively: bool,
+    /// What happened, as the rig told it.
+    pub(super) events: Vec<EventMessage>,
+    /// The last health record.
+    pub(super) health: Option<Health>,
+    answers: Vec<(u16, Answer)>,
+}
+
+impl Witness {
+    pub(super) fn new() -> Self {
+        Self {
+            client: Client::new(),
+            alive_at: 0,
+            lively: true,
+            events: Vec::new(),
+            health: None,
+            answers: Vec::new(),
+        }
+    }
+
+    /// Listens until an instant.
+    pub(super) fn listen(&mut self, desk: &mut Desk, until_ns: u64) -> Result<(), BenchError> {
+        while desk.now_ns() < until_ns {
+            if self.lively && desk.now_ns() >= self.alive_at {
+                self.alive_at = desk.now_ns() + ALIVE_NS;
+                self.client.request(Command::KeepAlive);
+            }
+            let outgoing = self.client.take_outgoing();
+            if !outgoing.is_empty() {
+                desk.send(&outgoing)?;
+            }
+            let next = until_ns.min(if self.lively { self.alive_at } else { until_ns });
+            self.client.receive(&desk.receive(next)?);
+            while let Some(message) = self.client.next_message() {
+                match message {
+                    Message::Event(event) => self.events.push(event),
+                    Message::Health(health) => self.health = Some(health),
+                    Message::Answer { id, answer } => self.answers.push((id, answer)),
+                    Message::Telemetry(_) => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks, and does not wait for the answer.
+    pub(super) fn send(&mut self, command: &Command) {
+        self.client.request(command.clone());
+    }
+
+    /// Asks, and waits for the answer; asks again where there is none.
+    pub(super) fn ask(&mut self, desk: &mut Desk, command: &Command) -> Result<Answer, BenchError> {
+        for _ in 0..3 {
+            let id = self.client.request(command.clone());
+            let until = desk.now_ns() + PATIENCE_NS;
+            while desk.now_ns() < until {
+                self.listen(desk, until.min(desk.now_ns() + 1_000_000))?;
+                if let Some(place) = self.answers.iter().position(|(other, _)| *other == id) {
+                    return Ok(self.answers.swap_remove(place).1);
+                }
+            }
+        }
+        Err(BenchError::Rig(format!("no answer to {command:?}")))
+    }
+
+    /// Whether the rig told of this fault.
+    pub(super) fn heard_of(&self, fault: u8) -> bool {
+        self.events.iter().any(|event| event.kind == EventKind::FaultLatched(fault))
+    }
+}

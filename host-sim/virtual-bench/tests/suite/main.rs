@@ -1,0 +1,16 @@
+//! The release ELF on the bench. `cargo test --release --package virtual-bench --ignore-rust-version`
+
+mod faults;
+
+use std::sync::OnceLock;
+use virtual_bench::elf::Firmware;
+use virtual_bench::firmware_build;
+
+/// The release ELF, built once.
+fn firmware() -> &'static Firmware {
+    static FIRMWARE: OnceLock<Firmware> = OnceLock::new();
+    FIRMWARE.get_or_init(|| {
+        let elf = firmware_build::release_elf().unwrap();
+        Firmware::read(&elf).unwrap()
+    })
+}
