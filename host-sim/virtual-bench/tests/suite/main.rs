@@ -1,4 +1,5 @@
 //! The release ELF on the bench. `cargo test --release --package virtual-bench --ignore-rust-version`
+#![allow(clippy::unwrap_used)]
 
 mod faults;
 
