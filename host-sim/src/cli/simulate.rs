@@ -16,7 +16,7 @@ use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 use crate::lockstep::Setup;
-use crate::plant::{ElementParameters, PERIOD_S};
+use crate::plant::{ElementParameters, PERIOD_S, left_out};
 use crate::report::{Block, Chart, Page};
 use crate::studies::contenders::rubber_of;
 use crate::studies::{patch_crossing, speed_sweep};
@@ -39,7 +39,8 @@ pub(super) struct Simulate {
     /// Rig file (TOML); the assumed rig where left out
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
-    /// Model file (TOML) of the elements on the disc; the assumed series element where left out
+    /// Model file (TOML) of the elements on the disc; the assumed series element where left out. Its
+    /// extensions that act on friction (heat, wear, dwell …) act on the plant
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
     /// Model file (TOML) that the controller's observer runs; that of the elements where left out
@@ -63,6 +64,9 @@ impl Simulate {
             Some(path) => ModelFile::read(path, &[])?,
             None => model.clone(),
         };
+        for id in left_out(&model) {
+            eprintln!("rig: {}: extension {id} does not act on friction itself: left out", model.source);
+        }
         let mut output = OutputDir::new(&self.out)?;
         let started = Instant::now();
         match &experiment.study {

@@ -3,7 +3,9 @@
 //! Each is one of the friction models of the core, in `f64`. Where all three bear the same load they do the same,
 //! so one is integrated and its force taken three times: exact, and three times as fast.
 
+use super::effects::Affected;
 use model_core::error::ParameterError;
+use model_core::extension::{ExtendedState, Extensions};
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
 use model_core::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
@@ -171,6 +173,7 @@ pub(crate) struct Elements {
     model: ElementModel,
     load_shares: [f64; 3],
     equal: bool,
+    affected: Option<Affected>,
 }
 
 /// State of the elements.
@@ -180,6 +183,18 @@ pub(crate) struct ElementsState {
     pub(crate) force_n: f64,
     /// Tip speed of the first element, the root's where it has no block.
     pub(crate) tip_speed_m_s: f64,
+    /// In place of the elements' own where effects act on them.
+    affected: Option<ExtendedState<f64>>,
+}
+
+impl ElementsState {
+    /// Deformation of the first element's block, or of its bristles where there is no block.
+    pub(crate) fn deformation_m(&self) -> f64 {
+        match &self.affected {
+            Some(affected) => ElementState::Single(affected.friction()).deformation_m(),
+            None => self.element[0].deformation_m(),
+        }
+    }
 }
 
 impl Elements {
@@ -191,16 +206,44 @@ impl Elements {
         // The model's own ranges are those of all elements together, so that is what an error must name.
         p.model(step_s)?;
         let equal = load_shares.iter().all(|s| (s - 1.0 / 3.0).abs() < 1e-12);
-        Ok(Self { model: p.share(1.0 / 3.0).model(step_s)?, load_shares, equal })
+        Ok(Self { model: p.share(1.0 / 3.0).model(step_s)?, load_shares, equal, affected: None })
+    }
+
+    /// The same elements with effects on their friction.
+    pub(crate) fn with_effects(
+        self,
+        p: &ElementParameters,
+        effects: Option<Extensions<f64>>,
+        radius_m: f64,
+        step_s: f64,
+    ) -> Result<Self, ParameterError> {
+        let affected = effects.map(|effects| Affected::new(p, effects, radius_m, step_s)).transpose()?;
+        Ok(Self { affected: affected.flatten(), ..self })
     }
 
     pub(crate) fn rest(&self) -> ElementsState {
-        ElementsState { element: [self.model.rest(); 3], force_n: 0.0, tip_speed_m_s: 0.0 }
+        ElementsState {
+            element: [self.model.rest(); 3],
+            force_n: 0.0,
+            tip_speed_m_s: 0.0,
+            affected: self.affected.as_ref().map(Affected::rest),
+        }
     }
 
     /// Moves the elements' roots at `speed_m_s` for one step under `normal_force_n` at its end.
     #[inline]
-    pub(crate) fn step(&self, state: &mut ElementsState, speed_m_s: f64, normal_force_n: f64) -> f64 {
+    pub(crate) fn step(
+        &self,
+        state: &mut ElementsState,
+        speed_m_s: f64,
+        disc_angle_rad: f64,
+        normal_force_n: f64,
+    ) -> f64 {
+        if let (Some(affected), Some(s)) = (&self.affected, &mut state.affected) {
+            state.force_n = affected.step(s, speed_m_s, disc_angle_rad, normal_force_n);
+            state.tip_speed_m_s = s.tip_speed_m_s();
+            return state.force_n;
+        }
         let third = Contact::new(speed_m_s, normal_force_n * self.load_shares[0]);
         let first = self.model.step(&mut state.element[0], &third);
         state.tip_speed_m_s = first.tip_speed_m_s;
@@ -235,8 +278,8 @@ mod tests {
                 let t = f64::from(k) * step;
                 let (v, n) = ((9.0 * t).sin() * 0.3, 60.0 + 40.0 * (31.0 * t).cos());
                 let forces = [
-                    equal.step(&mut a, v, n),
-                    each.step(&mut b, v, n),
+                    equal.step(&mut a, v, 0.0, n),
+                    each.step(&mut b, v, 0.0, n),
                     whole.step(&mut c, &Contact::new(v, n)).force_n,
                 ];
                 // Only rounding tells them apart; bristles multiply it by σ0/k_u ≈ 600.
@@ -253,7 +296,7 @@ mod tests {
         let elements = Elements::new(&p, [0.5, 0.3, 0.2], step).unwrap();
         let mut state = elements.rest();
         for _ in 0..20_000 {
-            elements.step(&mut state, 0.3, 90.0);
+            elements.step(&mut state, 0.3, 0.0, 90.0);
         }
         let steady = 90.0 * (0.5 + 0.7 * (-(0.3f64 / 0.5).sqrt()).exp());
         assert!((state.force_n / steady - 1.0).abs() < 1e-9, "{} against {steady}", state.force_n);

@@ -1,5 +1,6 @@
 //! The plant that a rig file and a model file describe.
 
+use super::effects;
 use super::elements::ElementParameters;
 use super::parameters::{
     BearingParameters, BridgeParameters, DiscParameters, DriveParameters, GeometryParameters, ModeParameters,
@@ -55,6 +56,7 @@ impl PlantParameters {
             noise: if options.sensor_noise { assumed.noise } else { NoiseParameters::none() },
             substeps: Substeps { busy: options.substeps, ..assumed.substeps },
             elements: ElementParameters::from_file(model),
+            effects: effects::of_contact(model),
             ..assumed
         }
     }

@@ -17,6 +17,7 @@
 mod analogue;
 mod bridge;
 mod disc;
+mod effects;
 mod elements;
 mod encoder;
 mod from_files;
@@ -27,6 +28,7 @@ mod press;
 mod step;
 
 pub use analogue::PinVoltages;
+pub use effects::left_out;
 pub use elements::{ElementModel, ElementParameters, ElementState};
 pub use encoder::Edge;
 pub use parameters::PlantParameters;
@@ -212,7 +214,7 @@ impl Plant {
             normal_force_n: s.press.normal_force_n(),
             friction_torque_nm: s.friction_torque_nm,
             bearing_torque_nm: self.disc.bearing().torque_and_slope(s.disc.speed_rad_s).0,
-            deformation_m: s.elements.element[0].deformation_m(),
+            deformation_m: s.elements.deformation_m(),
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::elements::ElementParameters;
 use model_core::error::ParameterError;
+use model_core::extension::Extensions;
 
 /// Everything the plant is built from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +38,8 @@ pub struct PlantParameters {
     pub substeps: Substeps,
     /// The friction of all three elements together.
     pub elements: ElementParameters,
+    /// Effects on that friction, beyond the model.
+    pub effects: Option<Extensions<f64>>,
 }
 
 /// How many sub-steps a control period is divided into. Stiff parts get more than asked for by themselves.
@@ -190,6 +193,7 @@ impl Default for PlantParameters {
             load_shares: [1.0 / 3.0; 3],
             substeps: Substeps { calm: 1, busy: 16 },
             elements: ElementParameters::default(),
+            effects: None,
         }
     }
 }

@@ -52,7 +52,12 @@ impl Grid {
             press: Press::new(p, step_s),
             m2_half_decay: Real::exp(-0.5 * step_s / p.m2.lag_s()),
             m2_lag_s: p.m2.lag_s(),
-            elements: Elements::new(&p.elements, p.load_shares, step_s)?,
+            elements: Elements::new(&p.elements, p.load_shares, step_s)?.with_effects(
+                &p.elements,
+                p.effects,
+                p.geometry.friction_radius_m,
+                step_s,
+            )?,
             bridges: [&p.friction_bridge, &p.normal_bridge].map(|b| Bridge::new(b, step_s)),
         })
     }
@@ -85,7 +90,8 @@ impl Grid {
         let (first, second) = (impulse(), impulse());
         disc.kick(&mut s.disc, 0.5 * h, first, s.friction_torque_nm);
         s.sliding_speed_m_s = s.disc.speed_rad_s * radius_m;
-        let force = self.elements.step(&mut s.elements, s.sliding_speed_m_s, normal_force_n);
+        let (speed_m_s, angle_rad) = (s.sliding_speed_m_s, s.disc.angle_rad);
+        let force = self.elements.step(&mut s.elements, speed_m_s, angle_rad, normal_force_n);
         s.friction_torque_nm = force * radius_m;
         disc.drift(&mut s.disc, h);
         disc.kick(&mut s.disc, 0.5 * h, second, s.friction_torque_nm);

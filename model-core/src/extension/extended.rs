@@ -60,6 +60,18 @@ pub struct ExtendedState<T> {
     past: Past<T>,
 }
 
+impl<T: Real> ExtendedState<T> {
+    /// State of the friction model inside.
+    pub fn friction(&self) -> FrictionState<T> {
+        self.friction
+    }
+
+    /// Sliding speed at the road: of the block's tip, or the root's where there is no block, m/s.
+    pub fn tip_speed_m_s(&self) -> T {
+        self.tip_speed_m_s
+    }
+}
+
 impl<T: Real> ExtendedFriction<T> {
     /// A model whose elements touch the disc at `radius_m`. Model and effects are prepared for the same
     /// step.
