@@ -5,6 +5,7 @@
 
 pub mod common;
 mod demo;
+mod design;
 mod fit;
 mod monitor;
 mod port;
@@ -63,6 +64,7 @@ commands! {
     Demo(demo::Demo),
     Predict(predict::Predict),
     Fit(fit::Fit),
+    Design(design::Design),
     Simulate(simulate::Simulate),
     Record(record::RecordArgs),
     Run(run::Run),

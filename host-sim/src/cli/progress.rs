@@ -56,6 +56,11 @@ impl Progress {
         }
     }
 
+    /// The number of all steps, where it was not known at the start.
+    pub fn of(&mut self, total: u64) {
+        self.total = total;
+    }
+
     /// So many more steps are done.
     pub fn advance(&mut self, steps: u64) {
         self.set(self.done + steps);

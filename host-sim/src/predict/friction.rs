@@ -193,8 +193,18 @@ pub fn simulate_friction(
     rig: &RigFile,
     inputs: &ContactInputs,
 ) -> Result<Vec<f64>, InputError> {
+    simulate_friction_as(model, rig, inputs, Accuracy::Fine)
+}
+
+/// As [`simulate_friction`], as fine as asked for.
+pub fn simulate_friction_as(
+    model: &ModelFile,
+    rig: &RigFile,
+    inputs: &ContactInputs,
+    accuracy: Accuracy,
+) -> Result<Vec<f64>, InputError> {
     let element = model.friction_model(SOME_STEP_S)?;
-    let plan = StepPlan::new(&element, &rig.friction_bridge, inputs, Accuracy::Fine);
+    let plan = StepPlan::new(&element, &rig.friction_bridge, inputs, accuracy);
     if extended::acts_on_friction(model) {
         extended::simulate(model, rig, inputs, &plan)
     } else {

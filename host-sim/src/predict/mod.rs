@@ -20,7 +20,9 @@ mod second_order;
 pub use bridge::BridgeModel;
 pub use drive::predict_drive;
 pub use extended::effects_elsewhere;
-pub use friction::{Accuracy, StepPlan, drive_contact, simulate_friction, simulate_planned};
+pub use friction::{
+    Accuracy, StepPlan, drive_contact, simulate_friction, simulate_friction_as, simulate_planned,
+};
 pub use inputs::ContactInputs;
 pub(crate) use inputs::integral;
 pub use normal_force::predict_normal_force;
