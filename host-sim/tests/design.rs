@@ -2,6 +2,8 @@
 //!
 //! Synthetic: the plant's rubber loses grip with heat. In a steady slide heat and distance go together.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use host_sim::design::separation::Reach;
 use host_sim::design::{self, Proposal};
 use host_sim::diagnose::noise;
