@@ -237,34 +237,50 @@ impl ModelFile {
     }
 
     fn build(&self, step_s: f64) -> Result<FrictionModel<f64>, ParameterError> {
-        // A name that a kind does not have is never asked for below.
-        let value = |name| self.get(name).unwrap_or(f64::NAN);
-        let lugre = || LugreParameters {
-            sigma0_n_per_m: value("sigma0_n_per_m"),
-            sigma1_n_s_per_m: value("sigma1_n_s_per_m"),
-            a2_s_per_m: value("a2_s_per_m"),
-            stribeck: StribeckParameters {
-                a0: value("a0"),
-                a1: value("a1"),
-                v0_m_s: value("v0_m_s"),
-                delta: value("delta"),
-                theta: value("theta"),
-            },
-        };
         match self.kind {
-            ModelKind::Brush => {
-                let (c_n_per_m, mu_s, mu_c) = (value("c_n_per_m"), value("mu_s"), value("mu_c"));
-                FrictionModel::brush(&BrushParameters { c_n_per_m, mu_s, mu_c }, step_s)
-            }
-            ModelKind::Lugre => FrictionModel::lugre(&lugre(), step_s),
-            ModelKind::ModifiedLugre => FrictionModel::modified_lugre(&lugre(), step_s),
-            ModelKind::Series => {
-                let (k_u_n_per_m, c_u_n_s_per_m) = (value("k_u_n_per_m"), value("c_u_n_s_per_m"));
-                FrictionModel::series(
-                    &SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles: lugre() },
-                    step_s,
-                )
-            }
+            ModelKind::Brush => FrictionModel::brush(&self.brush(), step_s),
+            ModelKind::Lugre => FrictionModel::lugre(&self.bristles(), step_s),
+            ModelKind::ModifiedLugre => FrictionModel::modified_lugre(&self.bristles(), step_s),
+            ModelKind::Series => FrictionModel::series(&self.block_and_bristles(), step_s),
+        }
+    }
+
+    /// A parameter that the kind has; a name that it does not have is not a number, which every model refuses.
+    fn value(&self, name: &str) -> f64 {
+        self.get(name).unwrap_or(f64::NAN)
+    }
+
+    /// The numbers as those of a brush.
+    pub fn brush(&self) -> BrushParameters<f64> {
+        BrushParameters {
+            c_n_per_m: self.value("c_n_per_m"),
+            mu_s: self.value("mu_s"),
+            mu_c: self.value("mu_c"),
+        }
+    }
+
+    /// The numbers as those of bristles: LuGre, plain or modified.
+    pub fn bristles(&self) -> LugreParameters<f64> {
+        LugreParameters {
+            sigma0_n_per_m: self.value("sigma0_n_per_m"),
+            sigma1_n_s_per_m: self.value("sigma1_n_s_per_m"),
+            a2_s_per_m: self.value("a2_s_per_m"),
+            stribeck: StribeckParameters {
+                a0: self.value("a0"),
+                a1: self.value("a1"),
+                v0_m_s: self.value("v0_m_s"),
+                delta: self.value("delta"),
+                theta: self.value("theta"),
+            },
+        }
+    }
+
+    /// The numbers as those of a block in series with bristles.
+    pub fn block_and_bristles(&self) -> SeriesParameters<f64> {
+        SeriesParameters {
+            k_u_n_per_m: self.value("k_u_n_per_m"),
+            c_u_n_s_per_m: self.value("c_u_n_s_per_m"),
+            bristles: self.bristles(),
         }
     }
 

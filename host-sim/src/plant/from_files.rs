@@ -9,10 +9,6 @@ use super::parameters::{
 use crate::files::experiment_file::PlantOptions;
 use crate::files::model_file::{ModelFile, ModelKind};
 use crate::files::rig_file::{Bridge, Motor, RigFile};
-use model_core::friction::brush::BrushParameters;
-use model_core::friction::lugre::LugreParameters;
-use model_core::friction::series::SeriesParameters;
-use model_core::friction::stribeck::StribeckParameters;
 
 impl PlantParameters {
     /// The plant of a rig with elements of a model. What neither file names keeps its assumed value.
@@ -66,33 +62,11 @@ impl ElementParameters {
     /// The parameters of a model file, without its extensions.
     #[must_use]
     pub fn from_file(model: &ModelFile) -> Self {
-        // A name that a kind does not have is never asked for below; the model refuses what is not a number.
-        let value = |name| model.get(name).unwrap_or(f64::NAN);
-        let lugre = || LugreParameters {
-            sigma0_n_per_m: value("sigma0_n_per_m"),
-            sigma1_n_s_per_m: value("sigma1_n_s_per_m"),
-            a2_s_per_m: value("a2_s_per_m"),
-            stribeck: StribeckParameters {
-                a0: value("a0"),
-                a1: value("a1"),
-                v0_m_s: value("v0_m_s"),
-                delta: value("delta"),
-                theta: value("theta"),
-            },
-        };
         match model.kind {
-            ModelKind::Brush => Self::Brush(BrushParameters {
-                c_n_per_m: value("c_n_per_m"),
-                mu_s: value("mu_s"),
-                mu_c: value("mu_c"),
-            }),
-            ModelKind::Lugre => Self::Lugre(lugre()),
-            ModelKind::ModifiedLugre => Self::ModifiedLugre(lugre()),
-            ModelKind::Series => Self::Series(SeriesParameters {
-                k_u_n_per_m: value("k_u_n_per_m"),
-                c_u_n_s_per_m: value("c_u_n_s_per_m"),
-                bristles: lugre(),
-            }),
+            ModelKind::Brush => Self::Brush(model.brush()),
+            ModelKind::Lugre => Self::Lugre(model.bristles()),
+            ModelKind::ModifiedLugre => Self::ModifiedLugre(model.bristles()),
+            ModelKind::Series => Self::Series(model.block_and_bristles()),
         }
     }
 }
