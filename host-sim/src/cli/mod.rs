@@ -6,6 +6,7 @@
 pub mod common;
 mod demo;
 mod design;
+mod diagnose;
 mod fit;
 mod monitor;
 mod port;
@@ -65,6 +66,7 @@ commands! {
     Predict(predict::Predict),
     Fit(fit::Fit),
     Design(design::Design),
+    Diagnose(diagnose::Diagnose),
     Simulate(simulate::Simulate),
     Record(record::RecordArgs),
     Run(run::Run),

@@ -2,14 +2,26 @@
 //!
 //! The rig is taken apart into subsystems ([`analysis::Analysis`]): each has a baseline and a list of
 //! effects that can be added to it, and can fit any combination of them to the training logs. What is
-//! compared is the same for all of them.
+//! compared is the same for all of them: [`selection`] chooses effects, [`structure`] says whether what is left is
+//! noise, [`verdict`] draws the conclusion, [`results`] and [`page`] tell it. [`run`] does it all.
 
 pub mod analysis;
 pub mod contact;
+pub mod coordinates;
 pub mod drive;
 pub mod effects;
+pub mod extended_model;
+pub mod next_experiment;
 pub mod noise;
+pub mod page;
+pub mod pooled;
 pub mod record;
+pub mod results;
+pub mod run;
 pub mod saturation;
+pub mod score;
 pub mod search;
+pub mod selection;
 pub mod smooth;
+pub mod structure;
+pub mod verdict;

@@ -1,0 +1,231 @@
+//! What a residual is looked at over: quantities of a log's motion and load at any time.
+//!
+//! From the log alone, without a model: speed is the slope of the smoothed position; sliding distance,
+//! dissipated energy (of the measured friction or effort) and heat (the same, forgotten with a time constant of
+//! [`COOLING_S`]) start at zero in each log; dwell is the rest before the last breakaway and counts for
+//! [`FRESH_S`] of motion. Quantities of which a log knows nothing are left out.
+
+use super::smooth;
+use crate::files::log::{Log, LogKind};
+use crate::files::signal::Signal;
+
+/// Time constant of the heat.
+const COOLING_S: f64 = 5.0;
+/// How long a breakaway is fresh.
+const FRESH_S: f64 = 0.15;
+/// Samples a second are enough for what a residual is sorted by.
+const RATE_HZ: f64 = 500.0;
+/// Share of the typical speed below which a drive rests.
+const REST_SHARE: f64 = 0.01;
+
+/// A quantity over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coordinate {
+    /// Name with unit, for sentences: "speed, rad/s".
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Value at each time; NaN where it does not apply.
+    pub values: Vec<f64>,
+    /// Each log has an origin of its own: bins are not shared between logs.
+    pub own_origin: bool,
+}
+
+/// All quantities of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coordinates {
+    start_s: f64,
+    /// Time from the log's start, s.
+    pub time_s: Vec<f64>,
+    /// −1, 0, 1.
+    pub direction: Vec<f64>,
+    /// Load that friction is proportional to: normal force, or 1.
+    pub load: Vec<f64>,
+    /// The quantities.
+    pub list: Vec<Coordinate>,
+}
+
+impl Coordinates {
+    /// From a log that was checked.
+    pub fn new(log: &Log) -> Self {
+        let kind = log.kind().unwrap_or(LogKind::RotaryDrive);
+        let time = log.time_s();
+        let start_s = time.first().copied().unwrap_or(0.0);
+        let span_s = time.last().copied().unwrap_or(0.0) - start_s;
+        let every = ((time.len() as f64 / span_s.max(1e-9)) / RATE_HZ).ceil().max(1.0) as usize;
+        let thin = |values: &[f64]| -> Vec<f64> {
+            values.chunks(every).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect()
+        };
+        let time_s: Vec<f64> = thin(time).iter().map(|t| t - start_s).collect();
+        let linear = kind == LogKind::LinearDrive;
+        let signal = |signal: Signal| log.signal(signal).map(thin);
+        let position = signal(if linear { Signal::Position } else { Signal::M2Angle });
+        let speed = match (&position, signal(Signal::M2Speed)) {
+            (_, Some(speed)) => speed,
+            (Some(position), None) => {
+                smooth::slope(&time_s, position, super::noise::standard_deviation(position)).values
+            }
+            (None, None) => vec![0.0; time_s.len()],
+        };
+        let typical = quantile(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.9);
+        let rest = REST_SHARE * typical;
+        let direction: Vec<f64> =
+            speed.iter().map(|v| if v.abs() > rest { v.signum() } else { 0.0 }).collect();
+        let normal = signal(Signal::NormalForce);
+        let effort = signal(if linear { Signal::Force } else { Signal::M2Torque });
+        let dissipating = signal(Signal::FrictionTorque).or_else(|| effort.clone());
+        let load = normal.clone().unwrap_or_else(|| vec![1.0; time_s.len()]);
+        let mut made = Self { start_s, time_s, direction, load, list: Vec::new() };
+        made.push("time", "s", made.time_s.clone(), true);
+        made.push("speed", if linear { "m/s" } else { "rad/s" }, speed.clone(), false);
+        if let Some(normal) = normal {
+            made.push("normal force", "N", normal, false);
+        }
+        if let Some(position) = &position {
+            let turn = if linear { f64::INFINITY } else { std::f64::consts::TAU };
+            let wrapped =
+                position.iter().map(|q| if turn.is_finite() { q.rem_euclid(turn) } else { *q }).collect();
+            let (name, unit) = if linear { ("position", "m") } else { ("disc angle", "rad") };
+            made.push(name, unit, wrapped, true);
+        }
+        made.push("direction", "", made.direction.clone(), false);
+        let slid = made.integral(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), f64::INFINITY);
+        made.push("sliding distance", if linear { "m" } else { "rad" }, slid, false);
+        if let Some(force) = &dissipating {
+            let power: Vec<f64> = force.iter().zip(&speed).map(|(f, v)| (f * v).abs()).collect();
+            let energy = made.integral(&power, f64::INFINITY);
+            made.push("dissipated energy", "J", energy, false);
+            let heat = made.integral(&power, COOLING_S);
+            made.push("heat", "J", heat, false);
+        }
+        let (dwell, since) = made.rests(&speed);
+        made.push("dwell", "s", dwell, false);
+        made.push("travel since reversal", if linear { "m" } else { "rad" }, since, false);
+        let acceleration =
+            smooth::slope(&made.time_s, &speed, super::noise::standard_deviation(&speed)).values;
+        made.push("acceleration", if linear { "m/s²" } else { "rad/s²" }, acceleration, false);
+        if let Some(effort) = effort {
+            made.push(
+                if linear { "force" } else { "M2 torque" },
+                if linear { "N" } else { "N m" },
+                effort,
+                false,
+            );
+        }
+        if let Some(torque) = signal(Signal::M1Torque) {
+            made.push("M1 torque", "N m", torque, false);
+        }
+        made
+    }
+
+    fn push(&mut self, name: &'static str, unit: &'static str, values: Vec<f64>, own_origin: bool) {
+        self.list.push(Coordinate { name, unit, values, own_origin });
+    }
+
+    fn integral(&self, rate: &[f64], forget_s: f64) -> Vec<f64> {
+        let mut sum = 0.0;
+        (0..rate.len())
+            .map(|i| {
+                if i > 0 {
+                    let step_s = self.time_s[i] - self.time_s[i - 1];
+                    sum = sum * (-step_s / forget_s).exp() + 0.5 * (rate[i] + rate[i - 1]) * step_s;
+                }
+                sum
+            })
+            .collect()
+    }
+
+    /// Rest before the last breakaway while that is fresh, and travel since the last reversal.
+    fn rests(&self, speed: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let (mut rest_from, mut dwell, mut moving_from) = (Some(0.0), f64::NAN, 0.0);
+        let (mut last, mut travel) = (0.0, 0.0);
+        let mut dwells = Vec::with_capacity(speed.len());
+        let mut travels = Vec::with_capacity(speed.len());
+        for (i, direction) in self.direction.iter().enumerate() {
+            let now = self.time_s[i];
+            if *direction == 0.0 {
+                rest_from = rest_from.or(Some(now));
+                dwells.push(f64::NAN);
+            } else {
+                if let Some(from) = rest_from.take() {
+                    (dwell, moving_from) = (now - from, now);
+                }
+                dwells.push(if now - moving_from < FRESH_S { dwell } else { f64::NAN });
+                if *direction != last {
+                    (last, travel) = (*direction, 0.0);
+                }
+            }
+            if i > 0 {
+                travel += speed[i].abs() * (now - self.time_s[i - 1]);
+            }
+            travels.push(travel);
+        }
+        (dwells, travels)
+    }
+
+    /// Index of the sample nearest to each time. Channels may count time from the log's start or as the log does.
+    pub fn at(&self, times: &[f64]) -> Vec<usize> {
+        let last = self.time_s.len().saturating_sub(1);
+        let end = self.time_s.last().copied().unwrap_or(0.0);
+        let absolute =
+            times.last().is_some_and(|t| *t > end + 1e-6) || times.first().is_some_and(|t| *t < 0.0);
+        let shift = if absolute { self.start_s } else { 0.0 };
+        let mut at = 0;
+        times
+            .iter()
+            .map(|t| {
+                while at < last && self.time_s[at] < t - shift {
+                    at += 1;
+                }
+                at
+            })
+            .collect()
+    }
+}
+
+/// A quantile of values; NaN are left out.
+pub fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut known: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    if known.is_empty() {
+        return 0.0;
+    }
+    let rank = (share * (known.len() - 1) as f64).round() as usize;
+    *known.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dwell_is_the_rest_before_the_breakaway_and_travel_starts_again_at_a_reversal() {
+        let time: Vec<f64> = (0..3000).map(|i| f64::from(i) * 1e-3).collect();
+        let speed = |t: f64| {
+            if t < 1.0 {
+                2.0
+            } else if t < 1.5 {
+                0.0
+            } else {
+                -2.0
+            }
+        };
+        let mut position = vec![0.0];
+        for t in &time[1..] {
+            position.push(position[position.len() - 1] + speed(*t) * 1e-3);
+        }
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, time);
+        log.set_signal(Signal::Position, position);
+        log.set_signal(Signal::Force, vec![1.0; 3000]);
+        let coordinates = Coordinates::new(&log);
+        let value = |name: &str, t: f64| {
+            let i = coordinates.at(&[t])[0];
+            coordinates.list.iter().find(|c| c.name == name).unwrap().values[i]
+        };
+        // Smoothing blurs the moment of breakaway by some samples.
+        assert!((value("dwell", 1.56) - 0.5).abs() < 0.05, "{}", value("dwell", 1.56));
+        assert!(value("dwell", 2.5).is_nan());
+        assert!((value("travel since reversal", 2.5) - 2.0).abs() < 0.1);
+        assert!((value("dissipated energy", 2.9) - 4.8).abs() < 0.1);
+    }
+}

@@ -1,0 +1,122 @@
+//! A whole diagnosis: logs in, judged subsystems out.
+
+use std::sync::Arc;
+
+use super::analysis::{Analysis, Role};
+use super::contact::ContactAnalysis;
+use super::coordinates::Coordinates;
+use super::drive::DriveAnalysis;
+use super::selection::select;
+use super::verdict::{Judged, judge};
+use crate::files::log::{Cells, Log, LogKind};
+use crate::files::model_file::ModelFile;
+use crate::files::rig_file::RigFile;
+use crate::input_error::InputError;
+
+/// Part of a log that is held out where no log is.
+const HELD_OUT_SHARE: f64 = 0.3;
+
+/// Logs with what is known about the rig, and the analyses that look at them.
+pub struct Case {
+    /// Training logs first.
+    pub logs: Vec<(Log, Role)>,
+    /// What was decided about them.
+    pub notes: Vec<String>,
+    /// The subsystems.
+    pub analyses: Vec<Arc<dyn Analysis>>,
+    /// The contact among them, which writes a model file.
+    pub contact: Option<Arc<ContactAnalysis>>,
+}
+
+impl Case {
+    /// Prepares the analyses. Where no log is held out, the end of each training log is.
+    pub fn new(
+        train: Vec<Log>,
+        holdout: Vec<Log>,
+        rig: &RigFile,
+        model: &ModelFile,
+    ) -> Result<Self, InputError> {
+        let mut notes = Vec::new();
+        let all = || train.iter().chain(&holdout);
+        let Some(first) = all().next() else { return Err(InputError::new("no log").key("--train")) };
+        let kind = first.kind()?;
+        for log in all() {
+            if log.kind()? != kind {
+                return Err(InputError::new("another kind of log than the first")
+                    .file(log.source.as_str())
+                    .allowed(format!("logs with the columns of {}", first.source)));
+            }
+        }
+        let mut logs: Vec<(Log, Role)> = Vec::new();
+        if holdout.is_empty() {
+            notes.push(format!(
+                "no log is held out: the last {:.0} % of each training log was not fitted to, and stands for one",
+                100.0 * HELD_OUT_SHARE
+            ));
+            let parts: Vec<(Log, Log)> = train.iter().map(split).collect();
+            logs.extend(parts.iter().map(|(start, _)| (start.clone(), Role::Train)));
+            logs.extend(parts.into_iter().map(|(_, end)| (end, Role::Holdout)));
+        } else {
+            logs.extend(train.into_iter().map(|log| (log, Role::Train)));
+            logs.extend(holdout.into_iter().map(|log| (log, Role::Holdout)));
+        }
+        let mut case = Self { logs, notes, analyses: Vec::new(), contact: None };
+        case.analyse(kind, rig, model)?;
+        Ok(case)
+    }
+
+    /// Fits that a diagnosis is likely to take, for a progress bar.
+    pub fn expected_fits(&self) -> u64 {
+        self.analyses.iter().map(|a| 1 + 3 * a.candidates().len() as u64).sum()
+    }
+
+    /// Fits, compares and judges; subsystems that cannot be fitted become notes.
+    pub fn judge(&self, told: &(dyn Fn(&str) + Sync)) -> (Vec<Judged<'_>>, Vec<String>) {
+        let coordinates: Vec<Coordinates> = self.logs.iter().map(|(log, _)| Coordinates::new(log)).collect();
+        let (mut judged, mut notes) = (Vec::new(), self.notes.clone());
+        for analysis in &self.analyses {
+            match select(analysis.as_ref(), told) {
+                Ok(selection) => judged.push(judge(analysis.as_ref(), selection, &coordinates)),
+                Err(why) => notes.push(format!("{}: not analysed: {why}", analysis.subsystem().name())),
+            }
+        }
+        (judged, notes)
+    }
+
+    fn analyse(&mut self, kind: LogKind, rig: &RigFile, model: &ModelFile) -> Result<(), InputError> {
+        let logs: Vec<(&Log, Role)> = self.logs.iter().map(|(log, role)| (log, *role)).collect();
+        let mut notes = Vec::new();
+        if kind == LogKind::Contact {
+            let contact = Arc::new(ContactAnalysis::new(rig, model, &logs)?);
+            self.analyses.push(contact.clone());
+            self.contact = Some(contact);
+        }
+        if kind != LogKind::Contact || logs.iter().all(|(log, _)| log.drive().is_ok()) {
+            match DriveAnalysis::new(&logs) {
+                Ok(drive) => self.analyses.push(Arc::new(drive)),
+                Err(why) => notes.push(format!("drive: not analysed: {why}")),
+            }
+        }
+        if self.analyses.is_empty() {
+            return Err(InputError::new(notes.join("; ")).file(self.logs[0].0.source.as_str()));
+        }
+        self.notes.extend(notes);
+        Ok(())
+    }
+}
+
+/// Start and end of a log as two logs.
+fn split(log: &Log) -> (Log, Log) {
+    let cut = ((1.0 - HELD_OUT_SHARE) * log.len() as f64).round() as usize;
+    let part = |from: usize, to: usize| {
+        let mut part = log.clone();
+        for column in &mut part.columns {
+            match &mut column.cells {
+                Cells::Numbers(values) => *values = values[from..to].to_vec(),
+                Cells::Text(values) => *values = values[from..to].to_vec(),
+            }
+        }
+        part
+    };
+    (part(0, cut), part(cut, log.len()))
+}

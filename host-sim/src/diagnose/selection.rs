@@ -1,0 +1,232 @@
+//! Which effects, of all that a subsystem's library has, the logs ask for.
+//!
+//! Stepwise: each round adds each candidate to each of the best combinations so far ([`BEAM`] of them, so
+//! that a strong rival cannot hide a pair), fits, and scores on the training logs ([`super::score`]). A
+//! round counts if its best gains more than its price and is material. Then every effect is taken out once
+//! again; one that is not missed goes. What is left must also lower the error on the held-out logs, which
+//! nothing was fitted to.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::analysis::{Analysis, Fit, Role};
+use super::score::{Independent, Score, likelihood_ratio, score};
+
+/// Combinations that go on into the next round.
+const BEAM: usize = 2;
+/// Most effects of one subsystem at once.
+const MOST_EFFECTS: usize = 3;
+/// Threads that fit.
+const THREADS: usize = 2;
+/// A rival that scores within this share of the best one's likelihood gain goes into the beam.
+const BEAM_SHARE: f64 = 0.5;
+/// An effect must lower the mean square of some channel by this much: below, it is significant only
+/// because there are many samples.
+const MATERIAL_SHARE: f64 = 0.01;
+/// Share of the training gain per sample that an effect must show on held-out logs.
+const CONFIRMED_SHARE: f64 = 0.2;
+
+/// A combination of effects, sorted.
+pub type Combination = Vec<&'static str>;
+
+/// What the search found.
+pub struct Selection {
+    /// All fits made; the empty combination is the baseline.
+    pub fits: BTreeMap<Combination, Arc<Fit>>,
+    /// Combinations that could not be fitted, and why.
+    pub failed: BTreeMap<Combination, String>,
+    /// Effects chosen, the strongest first.
+    pub chosen: Combination,
+    /// Effects that gained on the training logs but not on the held-out ones.
+    pub unconfirmed: Vec<&'static str>,
+    /// Independent values that the chosen fit leaves.
+    pub independent: Independent,
+}
+
+impl Selection {
+    /// The baseline.
+    pub fn baseline(&self) -> Option<&Fit> {
+        self.fits.get(&Vec::new()).map(Arc::as_ref)
+    }
+
+    /// The fit of a combination.
+    pub fn fit(&self, effects: &[&'static str]) -> Option<&Fit> {
+        self.fits.get(&sorted(effects)).map(Arc::as_ref)
+    }
+
+    /// The chosen fit.
+    pub fn extended(&self) -> Option<&Fit> {
+        self.fit(&self.chosen)
+    }
+
+    /// Score of a combination that was fitted.
+    pub fn score(&self, effects: &[&'static str]) -> Option<Score> {
+        Some(score(self.baseline()?, self.fit(effects)?, &self.independent))
+    }
+}
+
+/// A combination in the order of its key.
+pub fn sorted(effects: &[&'static str]) -> Combination {
+    let mut key = effects.to_vec();
+    key.sort_unstable();
+    key
+}
+
+/// A combination without one effect.
+pub fn without(effects: &[&'static str], effect: &str) -> Combination {
+    effects.iter().copied().filter(|id| *id != effect).collect()
+}
+
+struct Search<'a> {
+    analysis: &'a dyn Analysis,
+    told: &'a (dyn Fn(&str) + Sync),
+    fits: BTreeMap<Combination, Arc<Fit>>,
+    failed: BTreeMap<Combination, String>,
+}
+
+/// Chooses the effects of a subsystem. `told` hears of every fit.
+///
+/// The error says why not even the baseline can be fitted.
+pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<Selection, String> {
+    let base = Arc::new(analysis.fit(&[], None)?);
+    told(analysis.subsystem().name());
+    let mut search = Search { analysis, told, fits: BTreeMap::new(), failed: BTreeMap::new() };
+    search.fits.insert(Vec::new(), base.clone());
+    let candidates = analysis.candidates();
+    let mut independent = Independent::of(&base, Role::Train);
+    let mut best: Combination = Vec::new();
+    let mut beam: Vec<Combination> = vec![Vec::new()];
+    for _ in 0..MOST_EFFECTS {
+        let wanted: Vec<(Combination, Combination)> = beam
+            .iter()
+            .flat_map(|set| {
+                let rest = candidates.iter().filter(|id| !set.contains(id));
+                rest.map(|id| (sorted(&[set.as_slice(), &[*id]].concat()), set.clone()))
+            })
+            .collect();
+        search.fit_all(&wanted);
+        let tried = || wanted.iter().map(|(set, _)| set).filter(|set| search.fits.contains_key(*set));
+        // The independent values are those that the best fit leaves.
+        let most = tried().max_by(|a, b| {
+            let value =
+                |set: &Combination| likelihood_ratio(&base, &search.fits[set], Role::Train, &independent).0;
+            value(a).total_cmp(&value(b))
+        });
+        if let Some(most) = most {
+            independent = Independent::of(&search.fits[most], Role::Train);
+        }
+        let rated = |set: &Combination| score(&base, &search.fits[set], &independent);
+        let mut ranked: Vec<(Combination, Score)> = tried().map(|set| (set.clone(), rated(set))).collect();
+        ranked.sort_by(|a, b| b.1.penalised.total_cmp(&a.1.penalised));
+        ranked.dedup_by(|a, b| a.0 == b.0);
+        let Some((set, top)) = ranked.first().cloned() else { break };
+        let before = rated(&best);
+        let material = step_share(&search.fits[&best], &search.fits[&set], &independent) > MATERIAL_SHARE;
+        if top.penalised <= before.penalised || !material {
+            break;
+        }
+        best = set;
+        let floor = before.likelihood + BEAM_SHARE * (top.likelihood - before.likelihood);
+        beam = ranked
+            .into_iter()
+            .filter(|(_, s)| s.likelihood >= floor)
+            .take(BEAM)
+            .map(|(set, _)| set)
+            .collect();
+    }
+    let unconfirmed = search.eliminate(&mut best, &mut independent);
+    let mut selection =
+        Selection { fits: search.fits, failed: search.failed, chosen: best, unconfirmed, independent };
+    selection.order();
+    Ok(selection)
+}
+
+/// Largest relative fall of a channel from one fit to the next.
+fn step_share(from: &Fit, to: &Fit, independent: &Independent) -> f64 {
+    likelihood_ratio(from, to, Role::Train, independent).1
+}
+
+impl Search<'_> {
+    /// Fits what is not known yet, some at a time.
+    fn fit_all(&mut self, wanted: &[(Combination, Combination)]) {
+        let mut todo: Vec<&(Combination, Combination)> = wanted
+            .iter()
+            .filter(|(set, _)| !self.fits.contains_key(set) && !self.failed.contains_key(set))
+            .collect();
+        todo.dedup_by(|a, b| a.0 == b.0);
+        let next = AtomicUsize::new(0);
+        let done: Mutex<Vec<(Combination, Result<Fit, String>)>> = Mutex::new(Vec::new());
+        let work = || {
+            while let Some((set, near)) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let fit = self.analysis.fit(set, self.fits.get(near).map(Arc::as_ref));
+                (self.told)(self.analysis.subsystem().name());
+                done.lock().unwrap_or_else(PoisonError::into_inner).push((set.clone(), fit));
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..THREADS {
+                scope.spawn(work);
+            }
+            work();
+        });
+        for (set, fit) in done.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            match fit {
+                Ok(fit) => {
+                    self.fits.insert(set, Arc::new(fit));
+                }
+                Err(why) => {
+                    self.failed.insert(set, why);
+                }
+            }
+        }
+    }
+
+    /// Takes out what is not missed, on the training logs or on the held-out ones; gives the latter.
+    fn eliminate(&mut self, best: &mut Combination, independent: &mut Independent) -> Vec<&'static str> {
+        let base = self.fits[&Vec::new()].clone();
+        let mut unconfirmed = Vec::new();
+        loop {
+            let wanted: Vec<(Combination, Combination)> =
+                best.iter().map(|effect| (without(best, effect), Vec::new())).collect();
+            self.fit_all(&wanted);
+            let full = self.fits[best].clone();
+            *independent = Independent::of(&full, Role::Train);
+            let held_out = Independent::of(&full, Role::Holdout);
+            let whole = score(&base, &full, independent);
+            let mut weakest: Option<(f64, &'static str, bool)> = None;
+            for effect in best.iter().copied() {
+                let Some(less) = self.fits.get(&without(best, effect)) else { continue };
+                let missed = whole.penalised - score(&base, less, independent).penalised;
+                let (trained, share) = likelihood_ratio(less, &full, Role::Train, independent);
+                let (held, _) = likelihood_ratio(less, &full, Role::Holdout, &held_out);
+                let per_value = trained / independent.total().max(1.0);
+                let has_holdout = held_out.total() > 0.0;
+                let confirmed = !has_holdout || held / held_out.total() >= CONFIRMED_SHARE * per_value;
+                let wanted = missed > 0.0 && share > MATERIAL_SHARE;
+                if !(wanted && confirmed) && weakest.is_none_or(|(least, ..)| missed < least) {
+                    weakest = Some((missed, effect, wanted));
+                }
+            }
+            let Some((_, effect, on_training)) = weakest else { return unconfirmed };
+            if on_training {
+                unconfirmed.push(effect);
+            }
+            *best = without(best, effect);
+        }
+    }
+}
+
+impl Selection {
+    /// Brings the chosen effects into the order of what is lost without each.
+    fn order(&mut self) {
+        let Some(full) = self.extended() else { return };
+        let loss = |effect: &&'static str| {
+            self.fit(&without(&self.chosen, effect))
+                .map_or(0.0, |less| likelihood_ratio(less, full, Role::Train, &self.independent).0)
+        };
+        let mut ordered: Vec<(f64, &'static str)> = self.chosen.iter().map(|e| (loss(e), *e)).collect();
+        ordered.sort_by(|a, b| b.0.total_cmp(&a.0));
+        self.chosen = ordered.into_iter().map(|(_, effect)| effect).collect();
+    }
+}

@@ -1,0 +1,267 @@
+//! From the fits of a subsystem to what is said about it.
+//!
+//! `none`: no effect earns its price and the baseline's residual is noise, or so little that no real model
+//! would do better. `named`: the chosen effects explain the structured part of the residual. `unknown`: it is structured and nothing
+//! explains it, or what is left after the best explanation is still more than [`LEFT_SHARE`] of it: then a nearest name would
+//! be a wrong one.
+//!
+//! Probabilities: each chosen effect against each rival in its place and against nothing in its place, by the
+//! differences of the penalised scores, which count independent values as the chosen fit leaves them.
+
+use super::analysis::{Analysis, Fit, Role};
+use super::coordinates::Coordinates;
+use super::score::likelihood_ratio;
+use super::selection::{Selection, without};
+use super::structure::{Structure, structures};
+
+/// Structured rest that an explanation may leave, of what the baseline leaves.
+const LEFT_SHARE: f64 = 0.25;
+/// Scores closer than this (natural logarithm) are not told apart: odds of 20 to 1.
+const INDISTINCT: f64 = 3.0;
+/// Certainty that is never exceeded.
+const MOST_CERTAIN: f64 = 0.999;
+/// Rejected rivals that are reported.
+const MOST_REJECTED: usize = 6;
+
+/// What is said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Noise.
+    None,
+    /// Causes are named.
+    Named,
+    /// Structured, and nothing explains it.
+    Unknown,
+}
+
+impl Verdict {
+    /// Name in result files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Named => "named",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// A chosen effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cause {
+    /// Effect id.
+    pub id: &'static str,
+    /// Probability against its rivals.
+    pub probability: f64,
+    /// Log-likelihood that is lost without it.
+    pub weight: f64,
+    /// Sentences with numbers.
+    pub evidence: Vec<String>,
+}
+
+/// A rival that was not chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rejected {
+    /// Effect id.
+    pub id: &'static str,
+    /// Probability.
+    pub probability: f64,
+    /// One sentence with a number.
+    pub why: String,
+}
+
+/// All that is known about a subsystem.
+pub struct Judged<'a> {
+    /// The subsystem's analysis.
+    pub analysis: &'a dyn Analysis,
+    /// Its fits.
+    pub selection: Selection,
+    /// What is said.
+    pub verdict: Verdict,
+    /// Chosen effects, the strongest first; none where the verdict is not `named`.
+    pub causes: Vec<Cause>,
+    /// Rivals, the closest first.
+    pub rejected: Vec<Rejected>,
+    /// Pairs that the logs cannot separate.
+    pub indistinguishable: Vec<Vec<&'static str>>,
+    /// Residual of the baseline on the training logs.
+    pub before: Vec<Structure>,
+    /// Residual of the best explanation.
+    pub after: Vec<Structure>,
+}
+
+impl Judged<'_> {
+    /// The fit that the results stand for: extended where causes are named, else the baseline.
+    pub fn result(&self) -> Option<&Fit> {
+        match self.verdict {
+            Verdict::Named => self.selection.extended(),
+            _ => self.selection.baseline(),
+        }
+    }
+
+    /// The largest structured part of the baseline's residual, in variances of the noise.
+    pub fn structured_before(&self) -> f64 {
+        self.before.iter().map(|s| s.structured).fold(0.0, f64::max)
+    }
+}
+
+/// Judges a subsystem.
+pub fn judge<'a>(
+    analysis: &'a dyn Analysis,
+    selection: Selection,
+    coordinates: &[Coordinates],
+) -> Judged<'a> {
+    let tested = |fit: Option<&Fit>| fit.map_or(Vec::new(), |fit| structures(fit, Role::Train, coordinates));
+    let before = tested(selection.baseline());
+    let after = if selection.chosen.is_empty() { before.clone() } else { tested(selection.extended()) };
+    let left = after.iter().any(|after| {
+        let start = before.iter().find(|b| b.channel == after.channel).map_or(0.0, |b| b.structured);
+        after.is_material() && (selection.chosen.is_empty() || after.structured > LEFT_SHARE * start)
+    });
+    let verdict = match (left, selection.chosen.is_empty()) {
+        (true, _) => Verdict::Unknown,
+        (false, true) => Verdict::None,
+        (false, false) => Verdict::Named,
+    };
+    let mut judged = Judged {
+        analysis,
+        selection,
+        verdict,
+        causes: Vec::new(),
+        rejected: Vec::new(),
+        indistinguishable: Vec::new(),
+        before,
+        after,
+    };
+    judged.name_causes();
+    judged.reject();
+    judged
+}
+
+impl Judged<'_> {
+    fn name_causes(&mut self) {
+        if self.verdict != Verdict::Named {
+            return;
+        }
+        let selection = &self.selection;
+        let chosen = selection.chosen.clone();
+        let (Some(full), Some(best)) = (selection.extended(), selection.score(&chosen)) else { return };
+        for id in &chosen {
+            let rest = without(&chosen, id);
+            let mut odds = 0.0;
+            for rival in std::iter::once(None).chain(self.analysis.candidates().into_iter().map(Some)) {
+                if rival.is_some_and(|rival| chosen.contains(&rival)) {
+                    continue;
+                }
+                let set: Vec<&'static str> = rest.iter().copied().chain(rival).collect();
+                let Some(score) = selection.score(&set) else { continue };
+                let behind = best.penalised - score.penalised;
+                odds += (-behind).exp();
+                if let Some(rival) = rival
+                    && behind < INDISTINCT
+                {
+                    self.indistinguishable.push(vec![id, rival]);
+                }
+            }
+            let probability = (1.0 / (1.0 + odds)).min(MOST_CERTAIN);
+            let mut evidence = self.analysis.evidence(id, full);
+            let mut weight = 0.0;
+            if let Some(less) = selection.fit(&rest) {
+                let (lost, share) = likelihood_ratio(less, full, Role::Train, &selection.independent);
+                weight = lost;
+                evidence.push(format!(
+                    "it takes {:.1} % off the mean square of the residual of the training logs{}",
+                    100.0 * share,
+                    held_out(less, full)
+                ));
+            }
+            self.causes.push(Cause { id, probability, weight, evidence });
+        }
+    }
+
+    fn reject(&mut self) {
+        let selection = &self.selection;
+        let chosen = &selection.chosen;
+        let named = self.verdict == Verdict::Named;
+        let Some(best) = selection.score(chosen) else { return };
+        let mut rejected: Vec<(f64, Rejected)> = Vec::new();
+        for id in self.analysis.candidates() {
+            if named && chosen.contains(&id) {
+                continue;
+            }
+            // In the place of one of the chosen, or beside them.
+            let places: Vec<Vec<&'static str>> = chosen
+                .iter()
+                .map(|replaced| [without(chosen, replaced), vec![id]].concat())
+                .chain([[chosen.as_slice(), &[id]].concat(), vec![id]])
+                .collect();
+            let scored = places.iter().filter_map(|set| Some((set, selection.score(set)?)));
+            let closest = scored.max_by(|a, b| a.1.penalised.total_cmp(&b.1.penalised));
+            let Some((set, score)) = closest else {
+                if let Some(why) = selection.failed.get(&vec![id]) {
+                    rejected.push((f64::INFINITY, Rejected { id, probability: 0.0, why: why.clone() }));
+                }
+                continue;
+            };
+            let behind = best.penalised - score.penalised;
+            let why = if selection.unconfirmed.contains(&id) {
+                "it gains on the training logs and less than a fifth of that on the held-out logs".to_string()
+            } else if !named && chosen.contains(&id) {
+                self.too_little(id)
+            } else if chosen.is_empty() {
+                format!(
+                    "it takes {:.2} % off the mean square of the residual: {:.1} in log-likelihood, {:.1} short of the price of its parameters",
+                    100.0 * score.share,
+                    score.likelihood,
+                    -score.penalised
+                )
+            } else if set.len() > chosen.len() {
+                format!(
+                    "beside {} it gains {:.1} in log-likelihood and misses the price of its parameters by {behind:.1}",
+                    chosen.join(" and "),
+                    score.likelihood - best.likelihood
+                )
+            } else {
+                format!(
+                    "in the place of {} it explains {:.0} % of the log-likelihood, {:.1} less",
+                    chosen.iter().filter(|c| !set.contains(c)).copied().collect::<Vec<_>>().join(" and "),
+                    100.0 * (score.likelihood / best.likelihood.max(1e-9)).max(0.0),
+                    best.likelihood - score.likelihood
+                )
+            };
+            let probability = ((-behind).exp() / (1.0 + (-behind).exp())).clamp(0.0, 0.5);
+            rejected.push((behind, Rejected { id, probability, why }));
+        }
+        rejected.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.rejected = rejected.into_iter().map(|(_, r)| r).take(MOST_REJECTED).collect();
+    }
+
+    /// Why an effect that was the best at hand is not named.
+    fn too_little(&self, id: &str) -> String {
+        let worst = self.after.iter().max_by(|a, b| a.structured.total_cmp(&b.structured));
+        let (Some(worst), effects) = (worst, self.selection.chosen.join(" and ")) else {
+            return format!("{id} does not explain the residual");
+        };
+        let start = self
+            .before
+            .iter()
+            .find(|b| b.channel == worst.channel)
+            .map_or(worst.structured, |b| b.structured);
+        format!(
+            "the nearest that the library has ({effects}), but {:.0} % of the structured residual is left",
+            100.0 * worst.structured / start.max(1e-12)
+        )
+    }
+}
+
+fn held_out(less: &Fit, full: &Fit) -> String {
+    match (less.nrmse(Role::Holdout), full.nrmse(Role::Holdout)) {
+        (Some(from), Some(to)) if from > 0.0 => {
+            format!(
+                ", and the error on the held-out logs falls from {:.2} % to {:.2} %",
+                100.0 * from,
+                100.0 * to
+            )
+        }
+        _ => String::new(),
+    }
+}
