@@ -27,6 +27,7 @@ pub mod rig;
 pub mod scenario;
 pub mod sensors;
 pub mod shadow;
+pub mod trial;
 pub mod truth;
 
 pub use effect::Effect;

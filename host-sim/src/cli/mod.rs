@@ -15,6 +15,7 @@ mod record;
 mod run;
 mod settings;
 mod simulate;
+mod trials;
 
 pub mod progress;
 
@@ -68,6 +69,7 @@ commands! {
     Design(design::Design),
     Diagnose(diagnose::Diagnose),
     Simulate(simulate::Simulate),
+    Trials(trials::Trials),
     Record(record::RecordArgs),
     Run(run::Run),
     Monitor(monitor::Monitor),

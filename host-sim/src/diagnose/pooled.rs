@@ -10,6 +10,8 @@ use super::analysis::{Channel, Fit, Role};
 
 /// Longest lag of the autocorrelation, s.
 const LONGEST_LAG_S: f64 = 2.0;
+/// Degrees of freedom of the loss: Gaussian up to about three standard deviations.
+const FREEDOM: f64 = 20.0;
 
 /// A channel over all logs of a role.
 #[derive(Debug, Clone)]
@@ -108,19 +110,25 @@ impl Pooled<'_> {
     }
 }
 
-/// Mean squares of a channel in two fits, over the samples that count in both.
-pub fn common_mean_squares(a: &Pooled<'_>, b: &Pooled<'_>) -> (f64, f64, usize) {
-    let (mut sum_a, mut sum_b, mut count) = (0.0, 0.0, 0);
-    for ((_, a), (_, b)) in a.pieces.iter().zip(&b.pieces) {
-        for (x, y) in a.residual.iter().zip(&b.residual) {
-            if x.is_finite() && y.is_finite() {
-                sum_a += x * x;
-                sum_b += y * y;
-                count += 1;
-            }
-        }
+/// Mean losses of a channel in two fits, over the samples that count in both, and their number.
+///
+/// The loss is Student's with [`FREEDOM`] degrees of freedom, in units of the lower of the two levels (not below noise):
+/// nearly the square, but a few outliers, a breakaway a moment too late, do not decide.
+pub fn common_losses(a: &Pooled<'_>, b: &Pooled<'_>) -> (f64, f64, usize) {
+    let pairs = || {
+        let pieces = a.pieces.iter().zip(&b.pieces);
+        let pairs = pieces.flat_map(|((_, a), (_, b))| a.residual.iter().zip(&b.residual));
+        pairs.filter(|(x, y)| x.is_finite() && y.is_finite())
+    };
+    let (sum_a, sum_b, count) =
+        pairs().fold((0.0, 0.0, 0usize), |(a, b, n), (x, y)| (a + x * x, b + y * y, n + 1));
+    if count == 0 {
+        return (0.0, 0.0, 0);
     }
-    if count == 0 { (0.0, 0.0, 0) } else { (sum_a / count as f64, sum_b / count as f64, count) }
+    let unit = (sum_a.min(sum_b) / count as f64).max(1.0);
+    let loss = |r: f64| unit * FREEDOM * (r * r / unit / FREEDOM).ln_1p();
+    let (loss_a, loss_b) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + loss(*x), b + loss(*y)));
+    (loss_a / count as f64, loss_b / count as f64, count)
 }
 
 #[cfg(test)]
@@ -168,6 +176,8 @@ pub mod tests {
     fn masked_samples_count_in_neither_fit() {
         let (a, b) = (fit_of(vec![1.0, f64::NAN, 3.0]), fit_of(vec![2.0, 5.0, f64::NAN]));
         let (a, b) = (channels(&a, Role::Train), channels(&b, Role::Train));
-        assert_eq!(common_mean_squares(&a[0], &b[0]), (1.0, 4.0, 1));
+        let (one, two, count) = common_losses(&a[0], &b[0]);
+        // 20 ln(1 + 1/20) and 20 ln(1 + 4/20).
+        assert!((one - 0.976).abs() < 1e-3 && (two - 3.646).abs() < 1e-3 && count == 1, "{one} {two}");
     }
 }

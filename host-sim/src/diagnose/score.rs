@@ -1,12 +1,12 @@
 //! How much better one fit is than another, and what its parameters cost.
 //!
 //! A channel's level of residual is not taken as known: no model of a real rig is perfect. Its log-likelihood
-//! with the level estimated is −(n/2) ln(mean square), n the number of independent values
+//! with the level estimated is −(n/2) ln(mean loss), the loss nearly the square, n the number of independent values
 //! ([`super::pooled`]) that the best fit at hand leaves. A parameter costs (1/2) ln n (Schwarz 1978), an effect costs
 //! [`EFFECT_PRICE`] more, because it was picked among many and its shapes were searched over a range.
 
 use super::analysis::{Fit, Role};
-use super::pooled::{channels, common_mean_squares};
+use super::pooled::{channels, common_losses};
 
 /// Price of an effect beside its parameters, in units of log-likelihood: a level of e⁻⁶ for each.
 pub const EFFECT_PRICE: f64 = 6.0;
@@ -54,7 +54,7 @@ pub fn likelihood_ratio(base: &Fit, fit: &Fit, role: Role, independent: &Indepen
     for before in &channels(base, role) {
         let after = channels(fit, role).into_iter().find(|c| c.name == before.name);
         let Some(after) = after else { continue };
-        let (from, to, count) = common_mean_squares(before, &after);
+        let (from, to, count) = common_losses(before, &after);
         if count == 0 || from <= 0.0 {
             continue;
         }
@@ -94,8 +94,9 @@ mod tests {
         let independent = Independent::of(&base, Role::Train);
         let score = score(&base, &fit, &independent);
         let expected = 0.5 * independent.total() * 4f64.ln();
-        assert!((score.likelihood - expected).abs() < 1e-6 * expected);
-        assert!((score.share - 0.75).abs() < 1e-12);
+        // The loss is the square only nearly.
+        assert!((score.likelihood - expected).abs() < 0.03 * expected);
+        assert!((score.share - 0.75).abs() < 0.01);
     }
 
     #[test]

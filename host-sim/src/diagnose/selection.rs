@@ -23,7 +23,7 @@ const THREADS: usize = 2;
 const BEAM_SHARE: f64 = 0.5;
 /// An effect must lower the mean square of some channel by this much: below, it is significant only
 /// because there are many samples.
-const MATERIAL_SHARE: f64 = 0.01;
+const MATERIAL_SHARE: f64 = 0.05;
 /// Share of the training gain per sample that an effect must show on held-out logs.
 const CONFIRMED_SHARE: f64 = 0.2;
 
