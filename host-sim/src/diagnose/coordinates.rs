@@ -13,6 +13,8 @@ use crate::files::signal::Signal;
 const COOLING_S: f64 = 5.0;
 /// How long a breakaway is fresh.
 const FRESH_S: f64 = 0.15;
+/// A shorter rest is noise around zero speed.
+const LEAST_REST_S: f64 = 0.02;
 /// Samples a second are enough for what a residual is sorted by.
 const RATE_HZ: f64 = 500.0;
 /// Share of the typical speed below which a drive rests.
@@ -147,7 +149,7 @@ impl Coordinates {
                 rest_from = rest_from.or(Some(now));
                 dwells.push(f64::NAN);
             } else {
-                if let Some(from) = rest_from.take() {
+                if let Some(from) = rest_from.take().filter(|from| now - from > LEAST_REST_S) {
                     (dwell, moving_from) = (now - from, now);
                 }
                 dwells.push(if now - moving_from < FRESH_S { dwell } else { f64::NAN });
