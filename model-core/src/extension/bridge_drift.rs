@@ -60,6 +60,13 @@ impl<T: Real> BridgeDrift<T> {
         torque_nm * (T::ONE + self.gain_rate * h) + self.zero_rate * h
     }
 
+    /// The torque behind a shown one, N·m. The gain is kept above 1/10.
+    #[inline]
+    pub fn true_torque_nm(&self, shown_nm: T, time_s: T) -> T {
+        let h = self.shape(time_s);
+        (shown_nm - self.zero_rate * h) / (T::ONE + self.gain_rate * h).at_least(T::from_f64(0.1))
+    }
+
     /// The normal force behind a measured one, N. The gain is kept above 1/10.
     #[inline]
     pub fn true_normal_force_n(&self, measured_n: T, time_s: T) -> T {

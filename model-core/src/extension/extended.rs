@@ -112,6 +112,25 @@ impl<T: Real> ExtendedFriction<T> {
         }
     }
 
+    /// Takes the element anew from what the friction channel shows at rest: a stuck element holds what it
+    /// stuck with, and that depends on how it came to rest more finely than a model can follow. Heat,
+    /// wear, age and creep stay as they are.
+    pub fn hold(&self, state: &mut ExtendedState<T>, shown_nm: T, input: &ExtendedInput<T>) {
+        let mut torque_nm = shown_nm;
+        if let Some(crosstalk) = &self.effects.bridge_crosstalk {
+            torque_nm -= crosstalk.torque_nm(input.normal_force_n);
+        }
+        if let Some(drift) = &self.effects.bridge_drift {
+            torque_nm = drift.true_torque_nm(torque_nm, state.time_s);
+        }
+        let mut contact = self.contact(input, state.time_s, T::ONE);
+        // What the load can carry includes what the effects make of friction.
+        contact.normal_force_n =
+            contact.normal_force_n * self.road_factor(state, &contact, input.disc_angle_rad);
+        state.force_n = torque_nm / self.radius_m;
+        state.friction = self.friction.holding(state.force_n, &contact);
+    }
+
     #[inline]
     fn contact(&self, input: &ExtendedInput<T>, time_s: T, road_factor: T) -> Contact<T> {
         let mut sliding_speed_m_s = self.radius_m * input.disc_speed_rad_s;

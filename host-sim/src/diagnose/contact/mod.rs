@@ -1,6 +1,7 @@
 //! The contact: friction torque given measured motion and load, with the channels that measure it.
 
 pub mod analysis;
+pub mod anchors;
 pub mod baseline;
 pub mod bins;
 pub mod evidence;

@@ -111,7 +111,13 @@ impl ContactModel {
         };
         let mut steps = plan.steps.iter();
         let mut before: Option<ExtendedOutput<f64>> = None;
-        for count in &plan.counts {
+        let mut anchors = plan.anchors.iter().peekable();
+        for (bin, count) in plan.counts.iter().enumerate() {
+            while let Some((_, anchor_nm)) = anchors.next_if(|(at, _)| *at <= bin) {
+                if let Some(step) = steps.as_slice().first() {
+                    model.hold(&mut state, *anchor_nm, &input(step));
+                }
+            }
             let (mut middle, mut last) = (None, ExtendedOutput::default());
             for (at, step) in steps.by_ref().take(usize::from(*count)).enumerate() {
                 if (step.length_s - step_s).abs() > 1e-6 * step_s {

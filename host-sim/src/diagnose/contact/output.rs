@@ -30,9 +30,9 @@ pub fn fit(problem: &Problem, fitted: &Fitted, effects: &[&'static str]) -> Resu
     let mut parameters = estimates(fitted);
     if problem.has_origin(&fitted.combination) {
         let effect = fitted.slots.iter().find(|slot| slot.log.is_some()).and_then(|slot| slot.effect);
-        for log in problem.training()..problem.records.len() {
+        for (log, value) in origins.iter().copied().enumerate().skip(problem.training()) {
             let name = "origin_rad".to_string();
-            parameters.push(Estimate { effect, name, value: origins[log], std: f64::NAN, log: Some(log) });
+            parameters.push(Estimate { effect, name, value, std: f64::NAN, log: Some(log) });
         }
     }
     Ok(Fit { effects: effects.to_vec(), parameters, logs })

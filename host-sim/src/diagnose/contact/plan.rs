@@ -8,6 +8,7 @@
 //! where a single sample was taken.
 
 use super::super::record::Record;
+use super::anchors;
 use super::bins::Bin;
 
 /// Step while the element winds up: a tenth of the 5 ms of an assumed block. The core's step is of second
@@ -48,6 +49,8 @@ pub struct Plan {
     pub counts: Vec<u16>,
     /// All steps.
     pub steps: Vec<Step>,
+    /// Bins before which the element is taken anew from what the friction channel shows, N·m.
+    pub anchors: Vec<(usize, f64)>,
 }
 
 impl Plan {
@@ -89,6 +92,10 @@ impl Plan {
             plan.counts.push(count);
             plan.time_s.push(0.5 * (from_s + to_s));
         }
+        plan.anchors = anchors::find(record, radius_m, load_n)
+            .into_iter()
+            .map(|(sample, shown_nm)| (bins.partition_point(|bin| bin.to <= sample), shown_nm))
+            .collect();
         plan
     }
 }
