@@ -15,6 +15,7 @@ pub mod next_experiment;
 pub mod noise;
 pub mod page;
 pub mod pooled;
+pub mod pressure;
 pub mod record;
 pub mod results;
 pub mod run;

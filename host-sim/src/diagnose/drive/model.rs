@@ -301,9 +301,18 @@ pub fn delayed(signal: &[f64], samples: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Σ x y
+/// Σ x y, in eight running sums: one would wait for each addition to end.
 pub fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
+    let count = x.len().min(y.len());
+    let (x, y) = (x[..count].chunks_exact(8), y[..count].chunks_exact(8));
+    let rest: f64 = x.remainder().iter().zip(y.remainder()).map(|(x, y)| x * y).sum();
+    let mut sums = [0.0; 8];
+    for (x, y) in x.zip(y) {
+        for lane in 0..8 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Solves the normal equations with some values held, columns brought to length one first.

@@ -8,6 +8,8 @@
 
 use std::f64::consts::PI;
 
+use super::model::dot;
+
 /// Half length in periods of the band limit.
 const HALF_LENGTH_PERIODS: f64 = 4.0;
 
@@ -84,7 +86,7 @@ impl Whitener {
         let weighted: Vec<f64> = signal.iter().zip(weight).map(|(x, w)| x * w).collect();
         self.positions(signal.len())
             .into_iter()
-            .map(|at| weighted[at - half..=at + half].iter().zip(&self.taps).map(|(x, tap)| x * tap).sum())
+            .map(|at| dot(&weighted[at - half..=at + half], &self.taps))
             .collect()
     }
 
