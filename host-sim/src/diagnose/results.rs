@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::analysis::{Fit, Role};
-use super::structure::View;
+use super::structure::{Structure, View};
 use super::verdict::{Judged, Verdict};
 
 /// Views named for an unexplained rest.
@@ -68,6 +68,19 @@ pub struct Correlation {
     pub share: f64,
 }
 
+/// A channel's residual on the training logs, in variances of the noise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the names say it")]
+pub struct ChannelResult {
+    pub name: String,
+    pub baseline: f64,
+    pub baseline_structured: f64,
+    pub explained: f64,
+    pub explained_structured: f64,
+    /// Structured part of the baseline's residual, relative to the signal.
+    pub baseline_structured_nrmse: f64,
+}
+
 /// One subsystem.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(missing_docs, reason = "the contract's names")]
@@ -76,10 +89,12 @@ pub struct SubsystemResult {
     pub causes: Vec<String>,
     pub baseline: Baseline,
     pub extended: Extended,
-    /// Structured part of the baseline's residual, in variances of the noise.
-    pub structured_before: f64,
-    /// The same for the best explanation.
-    pub structured_after: f64,
+    /// The best explanation, named or not.
+    pub nearest: Vec<String>,
+    /// Fits that were compared.
+    pub fits: usize,
+    /// Residuals of the training logs.
+    pub channels: Vec<ChannelResult>,
     /// What the rest goes along with, where it is more than noise.
     pub correlates_with: Vec<Correlation>,
 }
@@ -117,6 +132,19 @@ pub fn parameters(fit: &Fit, effect: Option<&str>) -> BTreeMap<String, Parameter
         .collect()
 }
 
+impl ChannelResult {
+    fn new((before, after): (&Structure, &Structure)) -> Self {
+        Self {
+            name: before.channel.to_string(),
+            baseline: before.mean_square,
+            baseline_structured: before.structured,
+            explained: after.mean_square,
+            explained_structured: after.structured,
+            baseline_structured_nrmse: before.nrmse,
+        }
+    }
+}
+
 impl SubsystemResult {
     /// From what was judged.
     pub fn new(judged: &Judged<'_>) -> Self {
@@ -124,8 +152,6 @@ impl SubsystemResult {
         let result = judged.result();
         let nrmse = |fit: Option<&Fit>, role| fit.and_then(|fit| fit.nrmse(role));
         let (before, after) = (nrmse(base, Role::Holdout), nrmse(result, Role::Holdout));
-        let largest =
-            |list: &[super::structure::Structure]| list.iter().map(|s| s.structured).fold(0.0, f64::max);
         Self {
             verdict: judged.verdict.name(),
             causes: judged.causes.iter().map(|c| c.id.to_string()).collect(),
@@ -139,8 +165,9 @@ impl SubsystemResult {
                 gain: before.zip(after).filter(|(b, _)| *b > 0.0).map(|(b, a)| 1.0 - a / b),
                 noise_floor_nrmse: result.and_then(|fit| fit.noise_floor(Role::Holdout)),
             },
-            structured_before: largest(&judged.before),
-            structured_after: largest(&judged.after),
+            nearest: judged.selection.chosen.iter().map(ToString::to_string).collect(),
+            fits: judged.selection.fits.len(),
+            channels: judged.before.iter().zip(&judged.after).map(ChannelResult::new).collect(),
             correlates_with: correlations(judged),
         }
     }

@@ -20,7 +20,7 @@ const MOST_EFFECTS: usize = 3;
 /// Threads that fit.
 const THREADS: usize = 2;
 /// A rival that scores within this share of the best one's likelihood gain goes into the beam.
-const BEAM_SHARE: f64 = 0.5;
+const BEAM_SHARE: f64 = 0.7;
 /// An effect must lower the mean square of some channel by this much: below, it is significant only
 /// because there are many samples.
 const MATERIAL_SHARE: f64 = 0.05;
