@@ -21,6 +21,7 @@ pub mod results;
 pub mod run;
 pub mod saturation;
 pub mod score;
+pub mod screening;
 pub mod search;
 pub mod selection;
 pub mod smooth;

@@ -6,6 +6,7 @@ use super::analysis::{Analysis, Role};
 use super::contact::ContactAnalysis;
 use super::coordinates::Coordinates;
 use super::drive::DriveAnalysis;
+use super::pressure::PressureAnalysis;
 use super::selection::select;
 use super::verdict::{Judged, judge};
 use crate::files::log::{Cells, Log, LogKind};
@@ -90,6 +91,11 @@ impl Case {
             let contact = Arc::new(ContactAnalysis::new(rig, model, &logs)?);
             self.analyses.push(contact.clone());
             self.contact = Some(contact);
+            match PressureAnalysis::new(rig, &logs) {
+                Ok(Some(press)) => self.analyses.push(Arc::new(press)),
+                Ok(None) => notes.push("pressure: not analysed: a log has no torque of M1".into()),
+                Err(why) => notes.push(format!("pressure: not analysed: {why}")),
+            }
         }
         if kind != LogKind::Contact || logs.iter().all(|(log, _)| log.drive().is_ok()) {
             match DriveAnalysis::new(&logs) {

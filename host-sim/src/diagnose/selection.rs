@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::analysis::{Analysis, Fit, Role};
 use super::score::{Independent, Score, likelihood_ratio, score};
+use super::screening::estimated_gain;
 
 /// Combinations that go on into the next round.
 const BEAM: usize = 2;
@@ -24,6 +25,10 @@ const BEAM_SHARE: f64 = 0.7;
 /// An effect must lower the mean square of some channel by this much: below, it is significant only
 /// because there are many samples.
 const MATERIAL_SHARE: f64 = 0.05;
+/// Estimated gain in log-likelihood below which an effect is not tried beside others.
+const LEAST_ESTIMATE: f64 = 3.0;
+/// Effects tried beside others, those with the largest estimates.
+const MOST_TRIED: usize = 6;
 /// Share of the training gain per sample that an effect must show on held-out logs.
 const CONFIRMED_SHARE: f64 = 0.2;
 
@@ -98,13 +103,8 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
     let mut best: Combination = Vec::new();
     let mut beam: Vec<Combination> = vec![Vec::new()];
     for _ in 0..MOST_EFFECTS {
-        let wanted: Vec<(Combination, Combination)> = beam
-            .iter()
-            .flat_map(|set| {
-                let rest = candidates.iter().filter(|id| !set.contains(id));
-                rest.map(|id| (sorted(&[set.as_slice(), &[*id]].concat()), set.clone()))
-            })
-            .collect();
+        let wanted: Vec<(Combination, Combination)> =
+            beam.iter().flat_map(|set| search.worthwhile(set, &candidates, &independent)).collect();
         search.fit_all(&wanted);
         let tried = || wanted.iter().map(|(set, _)| set).filter(|set| search.fits.contains_key(*set));
         // The independent values are those that the best fit leaves.
@@ -120,8 +120,11 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
         let mut ranked: Vec<(Combination, Score)> = tried().map(|set| (set.clone(), rated(set))).collect();
         ranked.sort_by(|a, b| b.1.penalised.total_cmp(&a.1.penalised));
         ranked.dedup_by(|a, b| a.0 == b.0);
-        let Some((set, top)) = ranked.first().cloned() else { break };
-        let before = rated(&best);
+        let Some((set, _)) = ranked.first().cloned() else { break };
+        // A search that ended early would leave something to be found for any other effect.
+        search.fit_again(std::slice::from_ref(&set), &set);
+        let rated = |set: &Combination| score(&base, &search.fits[set], &independent);
+        let (before, top) = (rated(&best), rated(&set));
         let material = step_share(&search.fits[&best], &search.fits[&set], &independent) > MATERIAL_SHARE;
         if top.penalised <= before.penalised || !material {
             break;
@@ -148,6 +151,49 @@ fn step_share(from: &Fit, to: &Fit, independent: &Independent) -> f64 {
 }
 
 impl Search<'_> {
+    /// A combination with each candidate that may gain something beside it, and where its fit starts.
+    fn worthwhile(
+        &self,
+        set: &Combination,
+        candidates: &[&'static str],
+        independent: &Independent,
+    ) -> Vec<(Combination, Combination)> {
+        let fit = &self.fits[set];
+        let mut rated: Vec<(f64, &'static str)> = candidates
+            .iter()
+            .filter(|id| !set.contains(id) && !self.failed.contains_key(&vec![**id]))
+            .map(|id| {
+                let alone = self.fits.get(&vec![*id]).filter(|_| !set.is_empty());
+                let gain = alone.and_then(|alone| estimated_gain(fit, alone, id, independent));
+                (gain.unwrap_or(f64::INFINITY), *id)
+            })
+            .filter(|(gain, _)| *gain > LEAST_ESTIMATE)
+            .collect();
+        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+        if !set.is_empty() {
+            rated.truncate(MOST_TRIED);
+        }
+        rated.into_iter().map(|(_, id)| (sorted(&[set.as_slice(), &[id]].concat()), set.clone())).collect()
+    }
+
+    /// Fits combinations again from one with more effects, and keeps what is better: a search that ended too early alone may not
+    /// have done so there.
+    fn fit_again(&mut self, sets: &[Combination], from: &Combination) {
+        let near = self.fits[from].clone();
+        for set in sets {
+            if let Ok(fit) = self.analysis.fit(set, Some(&near)) {
+                (self.told)(self.analysis.subsystem().name());
+                let better = self.fits.get(set).is_none_or(|known| {
+                    let independent = Independent::of(known, Role::Train);
+                    likelihood_ratio(known, &fit, Role::Train, &independent).0 > 0.0
+                });
+                if better {
+                    self.fits.insert(set.clone(), Arc::new(fit));
+                }
+            }
+        }
+    }
+
     /// Fits what is not known yet, some at a time.
     fn fit_all(&mut self, wanted: &[(Combination, Combination)]) {
         let mut todo: Vec<&(Combination, Combination)> = wanted
@@ -187,9 +233,8 @@ impl Search<'_> {
         let base = self.fits[&Vec::new()].clone();
         let mut unconfirmed = Vec::new();
         loop {
-            let wanted: Vec<(Combination, Combination)> =
-                best.iter().map(|effect| (without(best, effect), Vec::new())).collect();
-            self.fit_all(&wanted);
+            let fewer: Vec<Combination> = best.iter().map(|effect| without(best, effect)).collect();
+            self.fit_again(&fewer, best);
             let full = self.fits[best].clone();
             *independent = Independent::of(&full, Role::Train);
             let held_out = Independent::of(&full, Role::Holdout);

@@ -63,10 +63,22 @@ impl ContactAnalysis {
         self.fitted.lock().unwrap_or_else(PoisonError::into_inner).get(&sorted(effects)).cloned()
     }
 
+    /// Fits a combination again, from one with the same or more effects, and keeps the better.
+    fn again(&self, effects: &[&'static str], known: &Arc<Fitted>, larger: &Arc<Fitted>) -> Arc<Fitted> {
+        let again = self.problem.fit_again(known, larger);
+        let mut fitted = self.fitted.lock().unwrap_or_else(PoisonError::into_inner);
+        fitted.insert(sorted(effects), again.clone());
+        again
+    }
+
     /// The fit of a combination, from that of another one.
     fn fitted(&self, effects: &[&'static str], near: Option<&Fit>) -> Result<Arc<Fitted>, String> {
+        let more = near.filter(|fit| effects.iter().all(|id| fit.effects.contains(id)));
         if let Some(known) = self.known(effects) {
-            return Ok(known);
+            return match more.and_then(|fit| self.known(&fit.effects)) {
+                Some(larger) => Ok(self.again(effects, &known, &larger)),
+                None => Ok(known),
+            };
         }
         let failed = || format!("no finite prediction with {}", effects.join(", "));
         let mut best = match near.and_then(|fit| self.known(&fit.effects)).or_else(|| self.known(&[])) {

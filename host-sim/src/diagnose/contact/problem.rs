@@ -440,6 +440,30 @@ impl Problem {
         Some(fitted)
     }
 
+    /// Fits a combination again from the values of a fit that has all of its effects, and keeps the better.
+    pub fn fit_again(&self, known: &Arc<Fitted>, from: &Fitted) -> Arc<Fitted> {
+        let mut start = known.as_ref().clone();
+        let residuals = |values: &[f64]| self.residuals(&known.combination, &known.slots, values);
+        let values = known.slots.iter().zip(&known.point.values).map(|(slot, own)| {
+            let same = |s: &&Slot| {
+                s.effect == slot.effect && s.log == slot.log && s.parameter.name == slot.parameter.name
+            };
+            from.slots.iter().position(|s| same(&s)).map_or(*own, |at| from.point.values[at])
+        });
+        match Point::at(values.collect(), &residuals) {
+            Some(point) => start.point = point,
+            None => return known.clone(),
+        }
+        let again = Arc::new(self.polish(&start, ROUNDS));
+        if again.point.loss >= known.point.loss {
+            return known.clone();
+        }
+        if let Ok(mut fits) = self.fits.lock() {
+            fits.insert(known.combination.clone(), again.clone());
+        }
+        again
+    }
+
     /// Continues a fit for more rounds: for the few that matter.
     pub fn polish(&self, fitted: &Fitted, rounds: usize) -> Fitted {
         let parameters: Vec<Parameter> = fitted.slots.iter().map(|slot| slot.parameter.clone()).collect();
