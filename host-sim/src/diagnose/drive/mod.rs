@@ -14,6 +14,7 @@ pub mod bearing_stribeck;
 pub mod conditioned;
 pub mod drive_delay;
 pub mod effect;
+pub mod encoder_eccentricity;
 pub mod m2_ripple;
 pub mod model;
 pub mod noise;
@@ -39,8 +40,9 @@ use super::analysis::{Analysis, Fit, Role};
 use crate::files::effect_id::Subsystem;
 use crate::files::log::Log;
 
-/// The drive's effects in the order of the contract.
-static EFFECTS: [&dyn DriveEffect; 8] = [
+/// The effects that show in the drive, in the order of the contract.
+static EFFECTS: [&dyn DriveEffect; 9] = [
+    &encoder_eccentricity::EncoderEccentricity,
     &shaft_torsion::ShaftTorsion,
     &backlash::Backlash,
     &m2_ripple::M2Ripple,
@@ -137,7 +139,9 @@ impl DriveAnalysis {
             if !prepared.starts().is_empty() {
                 grids.push((at, prepared.starts().to_vec()));
             }
-            if let Some(origins) = prepared.origins() {
+            // Effects locked to position share each log's origin: the first of them has found it.
+            let found = parts.iter().any(|part| part.prepared.origins().is_some());
+            if let Some(origins) = prepared.origins().filter(|_| !found) {
                 shapes.origins[..origins.starts.len()].copy_from_slice(origins.starts);
             }
             parts.push(Part { id: effect.id(), prepared });

@@ -7,7 +7,9 @@
 //!
 //! **Timing.** The channels of a log need not be sampled at the same instant: a command held over its
 //! period alone acts half a period late. Up to [`TIMING_S`] is therefore taken as the log's timing and
-//! is part of the baseline, once for M2's torque and once for the friction channel.
+//! is part of the baseline, once for M2's torque and once for the friction channel. The torque ring and
+//! its amplifier are low-passes: below their modes the true friction is T + timing·Ṫ + ring·T̈, and ring =
+//! Σ 1/ω² is fitted too, up to that of a mode at [`SLOWEST_RING_HZ`].
 //! Left out: gains of the torque channels; they cannot be told from the inertia.
 
 use std::sync::Arc;
@@ -22,6 +24,11 @@ use crate::fit::drive::record::central_difference;
 
 /// Largest difference in time between two channels that is not called a delay, s.
 pub const TIMING_S: f64 = 1e-3;
+
+/// Lowest mode of the torque ring that is taken as known.
+pub const SLOWEST_RING_HZ: f64 = 300.0;
+/// Name of the ring's term.
+pub const FRICTION_RING: &str = "friction_ring_s2";
 
 /// An effect in the model.
 #[derive(Clone)]
@@ -42,6 +49,7 @@ pub struct Filtered {
     baseline: [Vec<f64>; 3],
     torque_timing: Vec<f64>,
     friction_timing: Option<Vec<f64>>,
+    friction_ring: Option<Vec<f64>>,
 }
 
 impl Filtered {
@@ -56,6 +64,7 @@ impl Filtered {
             baseline: [white(&log.acceleration), white(&log.speed), white(&log.direction)],
             torque_timing: rate(&gross(&log)),
             friction_timing: log.contact.as_ref().map(|contact| rate(&contact.friction)),
+            friction_ring: log.contact.as_ref().map(|contact| white(&curvature(&contact.friction, step_s))),
             whitener,
             log,
         }
@@ -172,6 +181,7 @@ impl Model<'_> {
         }
         if log.contact.is_some() {
             names.push(baseline("friction_timing_s"));
+            names.push(baseline(FRICTION_RING));
         }
         names
     }
@@ -208,6 +218,7 @@ impl Model<'_> {
             columns.push(filtered.torque_timing.clone());
         }
         columns.extend(filtered.friction_timing.clone());
+        columns.extend(filtered.friction_ring.clone());
         Whitened { effort, columns }
     }
 
@@ -233,18 +244,13 @@ impl Model<'_> {
         }
         let mut held: Vec<Option<f64>> = vec![None; count];
         let mut values = solve_normal(&normal, &right, &held)?;
-        let beyond: Vec<usize> =
-            (0..count).filter(|&i| is_timing(&names[i]) && values[i].abs() > TIMING_S).collect();
-        // Friction that rises from standstill is not this effect.
-        let wrong: Vec<usize> =
-            (0..count).filter(|&i| is_static_excess(&names[i]) && values[i] < 0.0).collect();
-        if !beyond.is_empty() || !wrong.is_empty() {
-            for i in beyond {
-                held[i] = Some(values[i].clamp(-TIMING_S, TIMING_S));
+        for i in 0..count {
+            let (low, high) = limits(&names[i]);
+            if !(low..=high).contains(&values[i]) {
+                held[i] = Some(values[i].clamp(low, high));
             }
-            for i in wrong {
-                held[i] = Some(0.0);
-            }
+        }
+        if held.iter().any(Option::is_some) {
             values = solve_normal(&normal, &right, &held)?;
         }
         if !energy.is_finite() || values.iter().any(|x| !x.is_finite()) {
@@ -255,13 +261,28 @@ impl Model<'_> {
     }
 }
 
-/// Whether a column's coefficient is a time between channels.
+/// Whether a column's coefficient is a time between channels, or the ring's.
 pub fn is_timing(name: &ColumnName) -> bool {
-    name.effect.is_none() && name.name.ends_with("_timing_s")
+    name.effect.is_none() && (name.name.ends_with("_timing_s") || name.name == FRICTION_RING)
 }
 
-fn is_static_excess(name: &ColumnName) -> bool {
-    name.effect == Some("bearing_stribeck") && name.name.starts_with("static_excess")
+/// Range of a coefficient.
+fn limits(name: &ColumnName) -> (f64, f64) {
+    if is_timing(name) && name.name == FRICTION_RING {
+        (0.0, (2.0 * std::f64::consts::PI * SLOWEST_RING_HZ).powi(-2))
+    } else if is_timing(name) {
+        (-TIMING_S, TIMING_S)
+    } else if name.effect == Some("bearing_stribeck") && name.name.starts_with("static_excess") {
+        // Friction that rises from standstill is not this effect.
+        (0.0, f64::INFINITY)
+    } else {
+        (f64::NEG_INFINITY, f64::INFINITY)
+    }
+}
+
+/// Second derivative by central differences.
+pub fn curvature(signal: &[f64], step_s: f64) -> Vec<f64> {
+    central_difference(&central_difference(signal, step_s), step_s)
 }
 
 /// Names of inertia, viscous and Coulomb friction.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::{Filtered, Model, Shapes, delayed, gross, is_timing};
+use super::model::{FRICTION_RING, Filtered, Model, Shapes, curvature, delayed, gross, is_timing};
 use super::solve::Solved;
 use crate::diagnose::analysis::{Channel, Estimate, Fit, LogFit, Role};
 use crate::fit::covariance;
@@ -174,7 +174,10 @@ fn log_fit(model: &Model<'_>, solved: &Solved, index: usize, channel: Channel) -
     if let Some(contact) = &log.contact {
         // The true friction is the measured one of `friction_timing_s` later.
         let friction = delayed(&contact.friction, -time_of("friction_timing_s") / step_s);
-        predicted.iter_mut().zip(&friction).for_each(|(sum, t)| *sum += t);
+        let (ring, curved) = (time_of(FRICTION_RING), curvature(&contact.friction, step_s));
+        for ((sum, t), curve) in predicted.iter_mut().zip(&friction).zip(&curved) {
+            *sum += t + ring * curve;
+        }
     }
     // The effort of now moves the drive a delay later: what it is now, the motion of then asks for.
     let delay_s = model.delay_s(&solved.shapes).unwrap_or_else(|| time_of("torque_timing_s"));
@@ -251,6 +254,13 @@ pub fn evidence(effect: &'static str, fit: &Fit, baseline: [&str; 3]) -> Vec<Str
         }),
         "backlash" => value("gap")
             .map(|gap| format!("at torque reversals the motor moves {gap:.3e} with its own inertia alone")),
+        "encoder_eccentricity" => value("cos_1").zip(value("sin_1")).map(|(cos, sin)| {
+            format!(
+                "torque and speed swing once per turn, the torque in proportion to the speed's square: the angle \
+                 is wrong by up to {:.4} rad",
+                cos.hypot(sin)
+            )
+        }),
         "m2_ripple" => {
             let lines: Vec<String> = (1..=own.len())
                 .filter_map(|i| {

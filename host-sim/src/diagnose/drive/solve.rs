@@ -111,9 +111,10 @@ pub fn solve(model: &Model<'_>, start: Shapes, grids: &[(usize, Vec<Vec<f64>>)])
     Ok(solved)
 }
 
-/// Where the parts ask for an origin.
+/// Where the parts ask for an origin; the widest and finest search where several do.
 pub fn origins(parts: &[Part]) -> Option<Origins<'_>> {
-    parts.iter().find_map(|part| part.prepared.origins())
+    let asked = parts.iter().filter_map(|part| part.prepared.origins());
+    asked.reduce(|a, b| Origins { span: a.span.max(b.span), step: a.step.min(b.step), ..a })
 }
 
 /// Finds the origins of logs that were not fitted: the only thing that is fitted to them.
@@ -121,9 +122,15 @@ pub fn origins(parts: &[Part]) -> Option<Origins<'_>> {
 /// A shift by o turns each pair of columns: cos w(q − o) = cos wo C + sin wo S, sin w(q − o) =
 /// cos wo S − sin wo C, so the sum of squares follows from the products of C and S at origin 0.
 fn align_holdout(model: &Model<'_>, solved: &mut Solved, origins: &Origins<'_>) {
-    let owner = model.parts.iter().find(|part| part.prepared.origins().is_some()).map(|part| part.id);
-    let Some(first) = solved.names.iter().position(|name| name.effect == owner) else { return };
-    let columns = first..first + 2 * origins.waves.len();
+    // Pairs of columns of all parts that are locked to position, and the wave number of each pair.
+    let mut columns = Vec::new();
+    let mut waves = Vec::new();
+    for part in model.parts {
+        let Some(own) = part.prepared.origins() else { continue };
+        let Some(first) = solved.names.iter().position(|name| name.effect == Some(part.id)) else { continue };
+        columns.extend(first..first + 2 * own.waves.len());
+        waves.extend_from_slice(own.waves);
+    }
     for log in 0..model.logs.len() {
         if model.logs[log].log.role == Role::Train {
             continue;
@@ -131,16 +138,15 @@ fn align_holdout(model: &Model<'_>, solved: &mut Solved, origins: &Origins<'_>) 
         solved.shapes.origins[log] = 0.0;
         let problem = model.whitened(&solved.shapes, log);
         let mut others = solved.sizes.values.clone();
-        others[columns.clone()].fill(0.0);
+        columns.iter().for_each(|&column| others[column] = 0.0);
         let left = problem.residual(&others);
-        let pairs = &problem.columns[columns.clone()];
+        let pairs: Vec<&Vec<f64>> = columns.iter().map(|&column| &problem.columns[column]).collect();
         let onto: Vec<f64> = pairs.iter().map(|column| dot(column, &left)).collect();
         let products: Vec<Vec<f64>> =
             pairs.iter().map(|a| pairs.iter().map(|b| dot(a, b)).collect()).collect();
-        let sizes = &solved.sizes.values[columns.clone()];
+        let sizes: Vec<f64> = columns.iter().map(|&column| solved.sizes.values[column]).collect();
         let cost = |origin: f64| -> f64 {
-            let turned: Vec<f64> = origins
-                .waves
+            let turned: Vec<f64> = waves
                 .iter()
                 .zip(sizes.chunks(2))
                 .flat_map(|(wave, pair)| {
