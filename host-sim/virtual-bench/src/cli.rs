@@ -1,9 +1,10 @@
 //! The command line of `cargo virtual-bench`.
 
+use crate::budget::{Budget, Cost};
 use crate::campaign;
 use crate::elf::Firmware;
 use crate::error::BenchError;
-use crate::experiment::{self, Done, Request};
+use crate::experiment::{self, Done, ObserverResidual, Request};
 use crate::firmware_build;
 use clap::{ArgGroup, Parser};
 use host_sim::cli::common::{SetArgs, say};
@@ -45,6 +46,12 @@ struct Cli {
     /// Make everything go wrong that can, and see that the firmware ends it
     #[arg(long, group = "what")]
     faults: bool,
+    /// Run all experiments and record anew what a control tick costs (budget.toml)
+    #[arg(long, group = "what")]
+    write_budget: bool,
+    /// A contact patch of 20 bristles in the firmware's observer, to see what it costs
+    #[arg(long, conflicts_with = "observer")]
+    patch_observer: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -69,14 +76,9 @@ struct Cli {
 struct BenchSummary {
     #[serde(flatten)]
     summary: Summary,
-    instructions_per_tick: MeanAndMax,
+    instructions_per_tick: Cost,
+    observer_residual: ObserverResidual,
     elf_sha256: String,
-}
-
-#[derive(Serialize)]
-struct MeanAndMax {
-    mean: f64,
-    max: u64,
 }
 
 /// Parses the command line and does what it says.
@@ -121,6 +123,11 @@ fn run(cli: Cli) -> Result<(), BenchError> {
     if cli.faults {
         return run_faults(&firmware(cli.elf)?);
     }
+    if cli.write_budget {
+        return Budget::write(&firmware(cli.elf)?, &mut |name, cost| {
+            say(&format!("{name:<12} mean {:>7.1}  max {:>5}\n", cost.mean, cost.max));
+        });
+    }
     let experiment = cli.experiment.clone().unwrap_or_default();
     run_experiment(cli, &experiment)
 }
@@ -157,6 +164,8 @@ fn run_experiment(cli: Cli, name: &str) -> Result<(), BenchError> {
             None => model.clone(),
         },
         model,
+        patch_observer: cli.patch_observer,
+        capture: true,
     };
     let Some(out) = cli.out else { return Ok(()) };
     let mut output = OutputDir::new(&out)?;
@@ -195,10 +204,8 @@ fn summary(
     };
     Ok(BenchSummary {
         summary: summarise(&request.experiment, &done.full_rate()?, facts)?,
-        instructions_per_tick: MeanAndMax {
-            mean: done.ticks.instructions.mean(),
-            max: done.ticks.instructions.max,
-        },
+        instructions_per_tick: Cost::of(&done.ticks),
+        observer_residual: done.observer_residual(),
         elf_sha256: firmware.sha256.clone(),
     })
 }

@@ -8,7 +8,7 @@ use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::full_rate;
 use crate::meter::Ticks;
-use crate::outside::Action;
+use crate::outside::{Action, PlantSide};
 use crate::plant_side::HostPlant;
 use crate::record::Record;
 use host_sim::files::experiment_file::ExperimentFile;
@@ -26,8 +26,10 @@ use host_sim::summary::phase_start_s;
 use model_core::control::ControlSettings;
 use rig_link::capture::CaptureTrigger;
 use rig_link::message::Command;
-use rig_link::model::ModelRecord;
+use rig_link::model::{FrictionRecord, ModelRecord};
 use rig_link::settings;
+use rig_link::telemetry::TelemetryRow;
+use serde::Serialize;
 
 /// From power-on until the firmware surely listens: clocks, settings in flash, self-check of 0.1 s.
 pub const BOOT_NS: u64 = 300_000_000;
@@ -49,6 +51,10 @@ pub struct Request {
     pub model: ModelFile,
     /// The observer's model, uploaded where it differs from the firmware's own.
     pub observer: ModelFile,
+    /// A contact patch in the observer in place of that model: no model file has this kind.
+    pub patch_observer: bool,
+    /// Read the capture of the full rate from the firmware's memory afterwards: 4 s more of virtual time.
+    pub capture: bool,
 }
 
 impl Request {
@@ -63,6 +69,8 @@ impl Request {
             rig: RigFile::read_or_assumed(None, &[])?,
             observer: model.clone(),
             model,
+            patch_observer: false,
+            capture: true,
         })
     }
 
@@ -92,7 +100,10 @@ impl Request {
             .filter(|info| info.get(&wanted).to_bits() != info.get(&own).to_bits())
             .map(|info| Command::SettingSet { key: info.key, value: info.get(&wanted) })
             .collect();
-        let model = model_upload::record(&self.observer)?;
+        let mut model = model_upload::record(&self.observer)?;
+        if self.patch_observer {
+            model.friction = patch(&model.friction);
+        }
         // What the firmware's observer runs without an upload.
         let resident = ModelRecord { friction: (&own.observer.model).into(), effects: heapless::Vec::new() };
         if model != resident {
@@ -100,6 +111,21 @@ impl Request {
         }
         Ok(commands)
     }
+}
+
+/// A patch with the bristles of a series element: 10 mm long, under 88 N as stiff.
+fn patch(friction: &FrictionRecord) -> FrictionRecord {
+    let FrictionRecord::Series { bristles, .. } = *friction else { return *friction };
+    FrictionRecord::LugrePatch { sigma0_per_m: bristles.sigma0_n_per_m / 88.0, length_m: 0.01, bristles }
+}
+
+/// What the observer's model left unexplained of the friction torque, over the rows of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct ObserverResidual {
+    /// Root mean square of measured less predicted, N·m.
+    pub rms_nm: f64,
+    /// The same over the root mean square of the measured.
+    pub nrmse: f64,
 }
 
 /// An experiment that was run.
@@ -140,6 +166,20 @@ impl Done {
         }
     }
 
+    /// What the observer's model left unexplained.
+    #[must_use]
+    pub fn observer_residual(&self) -> ObserverResidual {
+        let mean = |square: &dyn Fn(&TelemetryRow) -> f64| {
+            self.run.rows.iter().map(square).sum::<f64>() / self.run.rows.len().max(1) as f64
+        };
+        let left = |row: &TelemetryRow| {
+            f64::from(row.friction_torque_nm) - f64::from(row.predicted_friction_torque_nm)
+        };
+        let rms_nm = mean(&|row| left(row).powi(2)).sqrt();
+        let measured_nm = mean(&|row| f64::from(row.friction_torque_nm).powi(2)).sqrt();
+        ObserverResidual { rms_nm, nrmse: if measured_nm > 0.0 { rms_nm / measured_nm } else { 0.0 } }
+    }
+
     /// A sentence for everything that must not be in a clean run.
     #[must_use]
     pub fn complaints(&self) -> Vec<String> {
@@ -178,7 +218,20 @@ pub fn run(
     progress: impl FnMut(u32, u32) + Send,
 ) -> Result<Done, BenchError> {
     let plant = request.plant()?;
-    let outcome = bench::run(firmware, Box::new(plant), |desk| operate(desk, request, progress))?;
+    run_with_plant(firmware, request, Box::new(plant), progress)
+}
+
+/// The same with another plant behind the pins than the request's.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with_plant(
+    firmware: &Firmware,
+    request: &Request,
+    plant: Box<dyn PlantSide>,
+    progress: impl FnMut(u32, u32) + Send,
+) -> Result<Done, BenchError> {
+    let outcome = bench::run(firmware, plant, |desk| operate(desk, request, progress))?;
     let Outcome { operator: Operated { run, ticks, captured }, record } = outcome;
     let log = defmt_log::decode(&firmware.bytes, &record.log)?;
     Ok(Done { run, ticks, captured, log, record })
@@ -199,8 +252,11 @@ fn operate(
         let answers = perform(desk, &mut client, &mut Ask::new(preparation), |_, _, _| Ok(()))?;
         answers.iter().try_for_each(words::accepted)?;
     }
-    client.request(Command::CaptureArm(CaptureTrigger::Command));
-    let mut capture_at = Some(request.capture_tick().min(total));
+    let mut capture_at = None;
+    if request.capture {
+        client.request(Command::CaptureArm(CaptureTrigger::Command));
+        capture_at = Some(request.capture_tick().min(total));
+    }
     let mut procedure = RunExperiment::new(experiment, RunOptions { every_ticks, ..RunOptions::default() });
     let mut ticks = None;
     let mut switch = ArmSwitch::default();
@@ -228,9 +284,10 @@ fn operate(
         Some(ticks) => ticks,
         None => desk.end_measuring()?,
     };
-    let captured = match run.fault {
-        None => Some(perform(desk, &mut client, &mut ReadCapture::new(None), |_, _, _| Ok(()))?),
-        Some(_) => None,
+    let captured = if request.capture && run.fault.is_none() {
+        Some(perform(desk, &mut client, &mut ReadCapture::new(None), |_, _, _| Ok(()))?)
+    } else {
+        None
     };
     Ok(Operated { run, ticks, captured })
 }

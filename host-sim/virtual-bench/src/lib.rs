@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod board;
+pub mod budget;
 pub mod campaign;
 pub mod cli;
 pub mod defmt_log;

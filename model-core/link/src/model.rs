@@ -9,6 +9,7 @@ use model_core::error::ParameterError;
 use model_core::extension::{Extension, Extensions, MOST_VALUES};
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
+use model_core::friction::lugre_patch::PatchParameters;
 use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::StribeckParameters;
 use serde::{Deserialize, Serialize};
@@ -59,7 +60,19 @@ pub enum FrictionRecord {
         /// The bristles.
         bristles: BristleRecord,
     },
+    /// LuGre contact patch, for its cost on the chip: model files have no such kind.
+    LugrePatch {
+        /// Stiffness of the bristles per load.
+        sigma0_per_m: f32,
+        /// Length of the patch.
+        length_m: f32,
+        /// The curve of sliding; its stiffness and damping are not used.
+        bristles: BristleRecord,
+    },
 }
+
+/// Fastest transport a patch is prepared for: the rig's over-speed limit at its radius.
+const PATCH_SPEED_M_S: f32 = 3.0;
 
 /// Parameters of the bristles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -125,6 +138,16 @@ impl From<&ModelParameters> for FrictionRecord {
                 c_u_n_s_per_m: p.c_u_n_s_per_m,
                 bristles: (&p.bristles).into(),
             },
+            ModelParameters::LugrePatch(p) => Self::LugrePatch {
+                sigma0_per_m: p.sigma0_per_m,
+                length_m: p.length_m,
+                bristles: BristleRecord::from(&LugreParameters {
+                    sigma0_n_per_m: 0.0,
+                    sigma1_n_s_per_m: 0.0,
+                    a2_s_per_m: p.a2_s_per_m,
+                    stribeck: p.stribeck,
+                }),
+            },
         }
     }
 }
@@ -140,6 +163,16 @@ impl From<&FrictionRecord> for ModelParameters {
             FrictionRecord::Series { k_u_n_per_m, c_u_n_s_per_m, bristles } => {
                 let bristles = (&bristles).into();
                 Self::Series(SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles })
+            }
+            FrictionRecord::LugrePatch { sigma0_per_m, length_m, bristles } => {
+                let LugreParameters { a2_s_per_m, stribeck, .. } = (&bristles).into();
+                Self::LugrePatch(PatchParameters {
+                    sigma0_per_m,
+                    a2_s_per_m,
+                    stribeck,
+                    length_m,
+                    largest_transport_speed_m_s: PATCH_SPEED_M_S,
+                })
             }
         }
     }

@@ -6,7 +6,7 @@ use model_core::extension::{Extension, MOST_VALUES};
 use rig_link::capture::CaptureRow;
 use rig_link::frame::{MAX_FRAME, encode};
 use rig_link::message::{Command, Request};
-use rig_link::model::{EffectRecord, FrictionRecord, MOST_EFFECTS, ModelRecord};
+use rig_link::model::{BristleRecord, EffectRecord, FrictionRecord, MOST_EFFECTS, ModelRecord};
 use rig_link::program::{Incomplete, Upload, header, segments};
 use rig_link::settings::{ALL, NotWhole, by_key, by_name};
 
@@ -129,6 +129,11 @@ fn a_friction_model_goes_to_the_observer_and_back_unchanged() {
         FrictionRecord::Brush { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 },
         FrictionRecord::Lugre(bristles),
         FrictionRecord::ModifiedLugre(bristles),
+        FrictionRecord::LugrePatch {
+            sigma0_per_m: 2e5,
+            length_m: 0.01,
+            bristles: BristleRecord { sigma0_n_per_m: 0.0, sigma1_n_s_per_m: 0.0, ..bristles },
+        },
     ] {
         assert_eq!(FrictionRecord::from(&ModelParameters::from(&friction)), friction);
         let record = ModelRecord { friction, ..ModelRecord::default() };

@@ -4,6 +4,8 @@
 //! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. Around
 //! the three stand the effects of [`crate::extension`] that a diagnosis added: they act on speed, load and friction
 //! coefficient of the contact, and on what the friction channel shows.
+//! A patch is one of [`PATCH_BRISTLES`] bristles for the whole contact. Rubber is taken to run through it at the sliding
+//! speed, as on a wheel; a block that is held fast has no transport, and costs the same.
 //!
 //! predicted = r·Σ F_i with its effects, passed through a second order Butterworth low-pass like the bridge's amplifier, so that
 //! measurement and prediction are late by the same time. residual = measured − predicted, with a running mean
@@ -16,12 +18,19 @@ use crate::error::ParameterError;
 use crate::extension::{ExtendedFriction, ExtendedInput, ExtendedState, Extensions};
 use crate::friction::brush::BrushParameters;
 use crate::friction::lugre::LugreParameters;
+use crate::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
 use crate::friction::series::SeriesParameters;
 use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
 use core::f32::consts::PI;
 
 /// Elements on the disc.
 pub const N_ELEMENTS: usize = 3;
+
+/// The load of the paper's experiments, at which a patch is as stiff as its stand-in.
+const PATCH_LOAD_N: f32 = 88.0;
+
+/// Bristles of a patch in the observer.
+pub const PATCH_BRISTLES: usize = 20;
 
 /// Parameters of a friction model of the whole contact, all elements together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,12 +43,65 @@ pub enum ModelParameters {
     ModifiedLugre(LugreParameters<f32>),
     /// Rubber block in series with LuGre bristles.
     Series(SeriesParameters<f32>),
+    /// LuGre contact patch, for its cost on the chip: model files have no such kind.
+    LugrePatch(PatchParameters<f32>),
+}
+
+/// The friction of the contact, prepared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Rubber {
+    Element(FrictionModel<f32>),
+    Patch(LugrePatch<f32, PATCH_BRISTLES>),
+}
+
+/// What the rubber remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum RubberState {
+    Elements([FrictionState<f32>; N_ELEMENTS]),
+    Patch(PatchState<f32, PATCH_BRISTLES>),
+}
+
+impl Rubber {
+    fn rest(&self) -> RubberState {
+        match self {
+            Self::Element(element) => RubberState::Elements([element.rest(); N_ELEMENTS]),
+            Self::Patch(_) => RubberState::Patch(PatchState::default()),
+        }
+    }
+
+    /// One step under the whole load.
+    #[inline(always)]
+    fn step(&self, state: &mut RubberState, whole: &Contact<f32>) -> FrictionForce<f32> {
+        match (self, &mut *state) {
+            (Self::Element(element), RubberState::Elements(elements)) => {
+                let load_n = whole.normal_force_n * (1.0 / N_ELEMENTS as f32);
+                let part = Contact { normal_force_n: load_n, ..*whole };
+                let mut sum = FrictionForce::default();
+                for state in elements {
+                    let one = element.step(state, &part);
+                    sum = FrictionForce {
+                        force_n: sum.force_n + one.force_n,
+                        tip_speed_m_s: one.tip_speed_m_s,
+                    };
+                }
+                sum
+            }
+            (Self::Patch(patch), RubberState::Patch(bristles)) => FrictionForce {
+                force_n: patch.step(bristles, whole, whole.sliding_speed_m_s),
+                tip_speed_m_s: whole.sliding_speed_m_s,
+            },
+            _ => {
+                *state = self.rest();
+                FrictionForce::default()
+            }
+        }
+    }
 }
 
 /// A model prepared for the observer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverModel {
-    element: FrictionModel<f32>,
+    rubber: Rubber,
     around: ExtendedFriction<f32>,
 }
 
@@ -50,6 +112,24 @@ impl ModelParameters {
             Self::Lugre(p) => FrictionModel::lugre(p, tick_s),
             Self::ModifiedLugre(p) => FrictionModel::modified_lugre(p, tick_s),
             Self::Series(p) => FrictionModel::series(p, tick_s),
+            // What stands for it where the effects ask for a model: the same curve.
+            Self::LugrePatch(p) => FrictionModel::lugre(
+                &LugreParameters {
+                    sigma0_n_per_m: p.sigma0_per_m * PATCH_LOAD_N,
+                    sigma1_n_s_per_m: 0.0,
+                    a2_s_per_m: p.a2_s_per_m,
+                    stribeck: p.stribeck,
+                },
+                tick_s,
+            ),
+        }
+    }
+
+    /// The friction of the whole contact, in elements or as a patch.
+    fn rubber(&self, tick_s: f32) -> Result<Rubber, ParameterError> {
+        match self {
+            Self::LugrePatch(p) => LugrePatch::new(p, tick_s).map(Rubber::Patch),
+            _ => self.share().prepare(tick_s).map(Rubber::Element),
         }
     }
 
@@ -70,6 +150,7 @@ impl ModelParameters {
                 c_u_n_s_per_m: p.c_u_n_s_per_m * share,
                 bristles: bristles(&p.bristles),
             }),
+            Self::LugrePatch(p) => Self::LugrePatch(*p),
         }
     }
 }
@@ -94,7 +175,7 @@ impl ObserverModel {
     ) -> Result<Self, ParameterError> {
         let tick_s = effects.step_s();
         let around = ExtendedFriction::new(whole.prepare(tick_s)?, effects, friction_radius_m)?;
-        Ok(Self { element: whole.share().prepare(tick_s)?, around })
+        Ok(Self { rubber: whole.rubber(tick_s)?, around })
     }
 }
 
@@ -109,7 +190,7 @@ pub(crate) struct Observer {
 /// What the observer remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverState {
-    elements: [FrictionState<f32>; N_ELEMENTS],
+    rubber: RubberState,
     around: ExtendedState<f32>,
     lowpass: LowpassState,
     mean_square: f32,
@@ -142,7 +223,7 @@ impl Observer {
 
     pub(crate) fn fresh(&self) -> ObserverState {
         ObserverState {
-            elements: [self.model.element.rest(); N_ELEMENTS],
+            rubber: self.model.rubber.rest(),
             around: self.model.around.holding(0.0, &ExtendedInput::default()),
             lowpass: LowpassState::default(),
             mean_square: 0.0,
@@ -156,16 +237,11 @@ impl Observer {
         measured: &ExtendedInput<f32>,
         friction_torque_nm: f32,
     ) -> Observed {
-        let (element, elements) = (&self.model.element, &mut state.elements);
-        let shown = self.model.around.step_around(&mut state.around, measured, |whole| {
-            let part = Contact { normal_force_n: whole.normal_force_n * (1.0 / N_ELEMENTS as f32), ..*whole };
-            let mut sum = FrictionForce::default();
-            for state in elements {
-                let one = element.step(state, &part);
-                sum = FrictionForce { force_n: sum.force_n + one.force_n, tip_speed_m_s: one.tip_speed_m_s };
-            }
-            sum
-        });
+        let (rubber, rubber_state) = (&self.model.rubber, &mut state.rubber);
+        let shown = self
+            .model
+            .around
+            .step_around(&mut state.around, measured, |whole| rubber.step(rubber_state, whole));
         let predicted_nm = self.lowpass.step(&mut state.lowpass, shown.shown_nm);
         let residual_nm = friction_torque_nm - predicted_nm;
         state.mean_square += self.averaging * (residual_nm * residual_nm - state.mean_square);
@@ -274,6 +350,27 @@ mod tests {
                 assert!(error < 1e-5 * 0.06 * 88.0, "{whole:?} {ticks}: {error}");
             }
         }
+    }
+
+    #[test]
+    fn a_patch_in_the_observer_gives_the_friction_of_the_patch() {
+        let ModelParameters::Lugre(bristles) = lugre() else { panic!() };
+        let p = PatchParameters {
+            sigma0_per_m: 2e5,
+            a2_s_per_m: 0.0,
+            stribeck: bristles.stribeck,
+            length_m: 0.01,
+            largest_transport_speed_m_s: 3.0,
+        };
+        let patch = LugrePatch::<f32, PATCH_BRISTLES>::new(&p, TICK_S).unwrap();
+        let (mut state, contact) = (PatchState::default(), Contact::new(0.18, 88.0));
+        let force_n = (0..200).map(|_| patch.step(&mut state, &contact, 0.18)).last().unwrap();
+        let observed =
+            run(ObserverModel::new(&ModelParameters::LugrePatch(p), 0.06, TICK_S).unwrap(), 0.0, 200);
+        // The speed goes through the disc's: rounding.
+        assert!((observed.predicted_nm - 0.06 * force_n).abs() < 1e-5, "{} {force_n}", observed.predicted_nm);
+        // A bristle of 5 µm in 10 mm of patch: sliding friction but for a thousandth.
+        assert!((f64::from(observed.predicted_nm) / steady_nm() - 1.0).abs() < 2e-3);
     }
 
     #[test]

@@ -261,6 +261,10 @@ impl<T: Real> Series<T> {
         if crosses {
             v = if rising { T::ZERO } else { -T::ZERO };
             at = self.balance(z, load, v);
+            // Where only rounding says that the root lies beyond, it lies here: no search would find it.
+            if at.value.abs() <= tolerance {
+                return (v, at);
+            }
         }
         // |bristle force| never exceeds its stored or its steady value, so the root lies within.
         let reach = self.lugre.sigma0 + self.sigma1_per_step;
