@@ -125,7 +125,7 @@ fn run(cli: Cli) -> Result<(), BenchError> {
     }
     if cli.write_budget {
         return Budget::write(&firmware(cli.elf)?, &mut |name, cost| {
-            say(&format!("{name:<12} mean {:>7.1}  max {:>5}\n", cost.mean, cost.max));
+            say(&format!("{name:<12} mean {:>7.1}  max {:>5}", cost.mean, cost.max));
         });
     }
     let experiment = cli.experiment.clone().unwrap_or_default();

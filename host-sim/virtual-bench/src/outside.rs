@@ -31,7 +31,7 @@ pub struct Sensors {
 }
 
 /// The plant behind the chip's pins, one control period at a time.
-pub trait PlantSide: Send {
+pub trait PlantSide: Send + Sync {
     /// What it shows before anything moved.
     fn sensors(&mut self) -> Sensors;
     /// One control period with these inputs, from `at` on; `edge` takes each encoder's edges in the order of time.

@@ -1,7 +1,13 @@
 //! The release ELF on the bench. `cargo test --release --package virtual-bench --ignore-rust-version`
 #![allow(clippy::unwrap_used)]
 
+mod bits;
+mod cost;
+mod defmt;
 mod faults;
+mod figures;
+mod runs;
+mod upload;
 
 use std::sync::OnceLock;
 use virtual_bench::elf::Firmware;
