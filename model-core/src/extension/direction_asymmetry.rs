@@ -1,6 +1,10 @@
 //! Friction that differs between the two directions of sliding: cut or worn rubber, a combed road.
 //!
-//! µ = µ0 (1 + d sgn v)
+//! µ = µ0 (1 + d(v) sgn F),   d(v) = d_f + (d_s − d_f)/(1 + |v|/v_d)
+//!
+//! The part of friction that falls with speed (adhesion) and the part that stays (hysteresis on the texture)
+//! need not differ by the same share, so slow and fast sliding each have their own. The direction is that of
+//! the force: a stuck element breaks away in the direction in which it is pulled.
 
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -8,23 +12,33 @@ use crate::real::Real;
 /// Asymmetry, prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionAsymmetry<T> {
-    asymmetry: T,
+    fast: T,
+    more_when_slow: T,
+    inverse_speed: T,
 }
 
 impl<T: Real> DirectionAsymmetry<T> {
-    /// Name of the parameter: half the relative difference, d.
-    pub const NAMES: &'static [&'static str] = &["asymmetry"];
+    /// Names of the parameters: half the relative difference in slow and in fast sliding; speed between
+    /// the two, m/s.
+    pub const NAMES: &'static [&'static str] = &["asymmetry_slow", "asymmetry_fast", "between_m_s"];
 
     /// Prepares the effect from values in the order of [`Self::NAMES`].
-    pub fn new(values: &[T; 1]) -> Result<Self, ParameterError> {
-        let allowed = values[0].abs() <= T::from_f64(0.95);
-        Ok(Self { asymmetry: require("asymmetry", values[0], allowed, "-0.95 to 0.95")? })
+    pub fn new(values: &[T; 3]) -> Result<Self, ParameterError> {
+        let share = |at: usize| {
+            let allowed = values[at].abs() <= T::from_f64(0.95);
+            require(Self::NAMES[at], values[at], allowed, "-0.95 to 0.95")
+        };
+        let (slow, fast) = (share(0)?, share(1)?);
+        let speed_allowed = values[2] >= T::from_f64(1e-6) && values[2] <= T::from_f64(1e3);
+        let speed = require("between_m_s", values[2], speed_allowed, "1e-6 to 1e3 m/s")?;
+        Ok(Self { fast, more_when_slow: slow - fast, inverse_speed: T::ONE / speed })
     }
 
-    /// What friction is multiplied with at a sliding speed.
+    /// What friction is multiplied with at a force and a speed of the tip.
     #[inline]
-    pub fn factor(&self, sliding_speed_m_s: T) -> T {
-        T::ONE + self.asymmetry * sliding_speed_m_s.sign()
+    pub fn factor(&self, force_n: T, tip_speed_m_s: T) -> T {
+        let slow = T::ONE / (T::ONE + tip_speed_m_s.abs() * self.inverse_speed);
+        T::ONE + (self.fast + self.more_when_slow * slow) * force_n.sign()
     }
 }
 
@@ -33,8 +47,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_directions_differ_by_twice_the_asymmetry() {
-        let effect = DirectionAsymmetry::new(&[0.1f64]).unwrap();
-        assert_eq!((effect.factor(0.2), effect.factor(-0.2), effect.factor(0.0)), (1.1, 0.9, 1.0));
+    fn directions_differ_by_twice_the_share_of_the_speed() {
+        let law = DirectionAsymmetry::new(&[0.2f64, 0.1, 0.5]).unwrap();
+        let difference = |speed: f64| law.factor(1.0, speed) - law.factor(-1.0, -speed);
+        assert!((difference(0.0) - 0.4).abs() < 1e-12);
+        assert!((difference(0.5) - 0.3).abs() < 1e-12);
+        assert!((difference(1e6) - 0.2).abs() < 1e-6);
     }
 }

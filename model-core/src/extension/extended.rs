@@ -8,6 +8,7 @@
 
 use super::friction_delay::Past;
 use super::ring_resonance::{RingResonance, RingState};
+use super::rubber_relaxation::{BRANCHES, Creep};
 use super::set::Extensions;
 use super::static_ageing::StaticAgeing;
 use super::thermal_fade::Heat;
@@ -55,7 +56,7 @@ pub struct ExtendedState<T> {
     heat_j: Heat<T>,
     distance: Distance<T>,
     age_s: T,
-    creep_m: T,
+    creep_m: Creep<T>,
     ring: RingState<T>,
     past: Past<T>,
 }
@@ -106,7 +107,7 @@ impl<T: Real> ExtendedFriction<T> {
             heat_j: [T::ZERO; 2],
             distance: Distance::default(),
             age_s: self.effects.static_ageing.as_ref().map_or(T::ZERO, StaticAgeing::first_age_s),
-            creep_m: T::ZERO,
+            creep_m: [T::ZERO; BRANCHES],
             ring: RingResonance::holding(torque_nm),
             past: Past::holding(shown_nm),
         }
@@ -164,7 +165,7 @@ impl<T: Real> ExtendedFriction<T> {
             factor = factor * ageing.factor(state.age_s);
         }
         if let Some(asymmetry) = &effects.direction_asymmetry {
-            factor = factor * asymmetry.factor(contact.sliding_speed_m_s);
+            factor = factor * asymmetry.factor(state.force_n, state.tip_speed_m_s);
         }
         if let Some(bell) = &effects.bell_curve {
             factor = factor * bell.factor(state.tip_speed_m_s);
@@ -296,10 +297,10 @@ mod tests {
         let contact: [(Extension, &[f64]); 8] = [
             (Extension::ThermalFade, &[1e-3, 5.0, 0.0, 50.0, 0.5, 1.0]),
             (Extension::WearDrift, &[0.1, 100.0]),
-            (Extension::LoadDependence, &[0.1, 50.0]),
+            (Extension::LoadDependence, &[0.1, 50.0, 0.0]),
             (Extension::StaticAgeing, &[0.1, 1e-3, 1e-3, 0.0]),
-            (Extension::DirectionAsymmetry, &[0.1]),
-            (Extension::BellCurve, &[0.5, 0.2, 1.0]),
+            (Extension::DirectionAsymmetry, &[0.1, 0.05, 0.5]),
+            (Extension::BellCurve, &[0.5, 0.2, 1.0, 1.0, 5.0]),
             (Extension::ViscousFilm, &[10.0]),
             (
                 Extension::DiscAngle,
@@ -347,7 +348,7 @@ mod tests {
 
     #[test]
     fn relaxing_rubber_gives_way_under_a_held_force() {
-        let effect: (Extension, &[f64]) = (Extension::RubberRelaxation, &[1e5, 0.05]);
+        let effect: (Extension, &[f64]) = (Extension::RubberRelaxation, &[1e5, 0.05, 1e12, 1.0, 1e12, 1.0]);
         let model = model(&[effect]);
         let input = ExtendedInput { disc_speed_rad_s: 0.0, disc_angle_rad: 0.0, normal_force_n: 88.0 };
         let mut state = model.holding(2.0, &input);

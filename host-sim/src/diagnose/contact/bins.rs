@@ -64,7 +64,7 @@ pub fn adaptive(record: &Record, radius_m: f64, speed_rad_s: &[f64], load_n: &[f
             && (n1 - n0).abs() <= CHANGE * n0.max(n1).max(LIGHT_N)
             && turned <= MOST_ANGLE_RAD
             && record.time_s[last] - record.time_s[from] <= LONGEST_S
-            && (from..to).all(|i| !friction.clipped(i))
+            && (from..to).all(|i| friction.clipped(i) == friction.clipped(from))
             && is_straight(&friction.values[from..to], friction.noise_std)
     };
     // Widest allowed at each sample, then narrowed so that neighbours differ by at most a factor of two.

@@ -57,7 +57,10 @@ fn meaning(effect: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<String> 
             )
         }
         "load_dependence" => {
-            format!("friction goes with normal force to the power {:.3}", 1.0 - value("exponent")?)
+            format!(
+                "around the usual load friction goes with normal force to the power {:.3}",
+                1.0 - value("exponent")?
+            )
         }
         "static_ageing" => format!(
             "friction grows by {:.1} % for each e-fold of rest beyond {:.2} s, and {:.2} mm of sliding renew it",
@@ -66,7 +69,11 @@ fn meaning(effect: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<String> 
             1e3 * value("memory_m")?
         ),
         "direction_asymmetry" => {
-            format!("friction differs by {:.1} % between the directions", percent(2.0 * value("asymmetry")?))
+            format!(
+                "friction differs between the directions by {:.1} % in slow and {:.1} % in fast sliding",
+                percent(2.0 * value("asymmetry_slow")?),
+                percent(2.0 * value("asymmetry_fast")?)
+            )
         }
         "bell_curve" => format!(
             "friction has a hump of {:.0} % around {:.3} m/s",
@@ -74,9 +81,14 @@ fn meaning(effect: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<String> 
             value("peak_m_s")?
         ),
         "rubber_relaxation" => format!(
-            "a held force creeps with {:.2} s; the creeping branch gives {:.0} % of the block's deflection",
+            "a held force creeps: within {:.3} s by {:.0} % of the block's deflection, {:.2} s by {:.0} %, \
+             {:.1} s by {:.0} %",
             value("relaxation_s")?,
-            percent(value("creep_ratio")?)
+            percent(value("creep_ratio")?),
+            value("relaxation_2_s")?,
+            percent(value("creep_ratio_2")?),
+            value("relaxation_3_s")?,
+            percent(value("creep_ratio_3")?)
         ),
         "viscous_film" => format!(
             "a force of {:.2} N per m/s does not depend on normal force",

@@ -9,6 +9,8 @@ pub mod model;
 pub mod output;
 pub mod plan;
 pub mod problem;
+pub mod restored;
+pub mod ringing;
 pub mod witness;
 
 pub use analysis::ContactAnalysis;

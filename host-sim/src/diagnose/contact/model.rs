@@ -18,6 +18,8 @@ pub struct ContactModel {
     pub effects: Vec<(Extension, Vec<f64>)>,
     /// How late the friction channel is against the motion beyond what the rig file explains, s.
     pub late_s: f64,
+    /// Whether the load beyond the end of a clipped normal bridge is taken from M1.
+    pub restored_load: bool,
 }
 
 /// Torque over a record.
@@ -38,7 +40,7 @@ impl ContactModel {
             .iter()
             .map(|spec| (spec.name, file.get(spec.name).or(spec.default).unwrap_or(0.0)))
             .collect();
-        Self { kind: file.kind, parameters, effects: Vec::new(), late_s: 0.0 }
+        Self { kind: file.kind, parameters, effects: Vec::new(), late_s: 0.0, restored_load: false }
     }
 
     /// Sets an effect, or replaces it.
@@ -79,8 +81,8 @@ impl ContactModel {
         ModelFile::new(source, self.kind, &self.parameters)
     }
 
-    /// The extended model for steps of one length, but for the delay: a record's steps are uneven, so that
-    /// is applied to the samples. The rig's own ring is there unless a ring among the effects stands in
+    /// The extended model for steps of one length, but for delay and clipping: a record's steps are uneven,
+    /// so these are applied to the samples. The rig's own ring is there unless a ring among the effects stands in
     /// for it.
     fn prepare(&self, rig: &RigFile, step_s: f64) -> Result<ExtendedFriction<f64>, InputError> {
         let friction = self.to_file("the fitted model")?.friction_model(step_s)?;
@@ -88,7 +90,8 @@ impl ContactModel {
         if let Some(mode) = rig.friction_bridge.mode.filter(|mode| mode.damping_ratio < 0.99) {
             set.set(Extension::RingResonance, &[mode.mode_hz, mode.damping_ratio.max(1e-4)])?;
         }
-        for (extension, values) in self.effects.iter().filter(|(e, _)| *e != Extension::FrictionDelay) {
+        let on_samples = [Extension::FrictionDelay, Extension::AdcSaturation];
+        for (extension, values) in self.effects.iter().filter(|(e, _)| !on_samples.contains(e)) {
             set.set(*extension, values)?;
         }
         Ok(ExtendedFriction::new(friction, set, rig.friction_radius_m)?)
@@ -142,6 +145,10 @@ impl ContactModel {
             before = Some(last);
         }
         torques.shown_nm = shifted(&plan.time_s, &torques.shown_nm, self.late_s + self.delay_s());
+        let ends = self.effects.iter().find(|(extension, _)| *extension == Extension::AdcSaturation);
+        if let Some([low, high]) = ends.map(|(_, values)| values.as_slice()) {
+            torques.shown_nm.iter_mut().for_each(|shown| *shown = shown.max(*low).min(*high));
+        }
         Ok(torques)
     }
 

@@ -14,6 +14,10 @@ use super::bins::Bin;
 /// Step while the element winds up: a tenth of the 5 ms of an assumed block. The core's step is of second
 /// order, so a few thousandths of the transient are wrong.
 const FINE_S: f64 = 500e-6;
+/// Step while the disc turns back: stiff bristles answer with a jump, and a ring keeps its phase for long.
+const TURN_S: f64 = 60e-6;
+/// Change of speed over two samples that is a turn and no noise, rad/s.
+const TURN_RAD_S: f64 = 0.05;
 /// Relative change of speed or load from one sample to the next that starts a fine stretch.
 const CHANGE: f64 = 0.01;
 /// Speed below which changes are not relative to itself but to this, m/s.
@@ -72,7 +76,8 @@ impl Plan {
             let (from_s, to_s) = (edge(bin.from), edge(bin.to));
             let span_s = to_s - from_s;
             let count = if bin.len() == 1 && fine[bin.from] {
-                2 * (0.5 * span_s / FINE_S).round().clamp(1.0, 32.0) as u16
+                let longest_s = if turns(speed_rad_s, bin.from) { TURN_S } else { FINE_S };
+                2 * (0.5 * span_s / longest_s).round().clamp(1.0, 32.0) as u16
             } else {
                 1
             };
@@ -98,6 +103,14 @@ impl Plan {
             .collect();
         plan
     }
+}
+
+/// Whether the disc starts, stops or turns next to a sample.
+fn turns(speed_rad_s: &[f64], at: usize) -> bool {
+    let near = &speed_rad_s[at.saturating_sub(1)..(at + 2).min(speed_rad_s.len())];
+    let (low, high) =
+        near.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    low <= 0.0 && high >= 0.0 && high - low > TURN_RAD_S
 }
 
 /// Samples at which an elastic element winds up.

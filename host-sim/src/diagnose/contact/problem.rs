@@ -9,7 +9,7 @@
 //! stuck on stiff bristles, the force depends on motion below the encoder's resolution.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use rayon::prelude::*;
 
@@ -21,6 +21,7 @@ use super::bins::{self, Bin};
 use super::model::{ContactModel, Torques};
 use super::plan::Plan;
 use super::witness::DriveWitness;
+use super::{restored, ringing};
 use crate::diagnose::analysis::Role;
 use crate::files::model_file::{ModelFile, ModelKind};
 use crate::files::rig_file::RigFile;
@@ -37,13 +38,15 @@ const STUCK_S: f64 = 6e-3;
 const STUCK_REACHES: f64 = 6.0;
 /// Part of what the ring adds that a record's timing leaves open.
 const RING_PHASE: f64 = 0.7;
+/// Uncertainty of the level from which a stuck element is wound up, of the sliding friction.
+const LEVEL: f64 = 0.006;
 /// Relative uncertainty of the load.
 const LOAD_GAIN: f64 = 0.01;
 /// Number of noisy runs that measure what the inputs' noise does.
 const NOISY_RUNS: u64 = 3;
 /// Renewals of the derivatives in the search from one start, and of the best of them.
 const FIRST_ROUNDS: usize = 1;
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 6;
 
 /// A free parameter and what it belongs to.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,6 +89,8 @@ pub struct Problem {
     pub plans: Vec<Plan>,
     /// Steps of each record's samples.
     sample_plans: Vec<Plan>,
+    /// Steps of bins and samples with the load beyond the end of a clipped bridge, where that is known.
+    restored_plans: Vec<Option<(Plan, Plan)>>,
     /// Expected standard deviation of the residual of each bin; NaN is masked.
     pub sigma_nm: Vec<Vec<f64>>,
     /// What the library knows about the records.
@@ -93,24 +98,32 @@ pub struct Problem {
     witness: Option<DriveWitness>,
     holdout_witness: Option<DriveWitness>,
     fits: Mutex<HashMap<Combination, Arc<Fitted>>>,
+    /// The model as it was given, with derivatives.
+    nominal: OnceLock<Fitted>,
 }
 
 impl Problem {
     /// Prepares logs (training first), smooths inputs, fits the baseline and sets the weights.
     pub fn new(rig: &RigFile, file: &ModelFile, records: Vec<Record>) -> Result<Self, InputError> {
         let radius_m = rig.friction_radius_m;
-        let prepared: Vec<(Vec<Bin>, (Plan, Plan))> = records
+        let prepared: Vec<_> = records
             .par_iter()
             .map(|record| {
                 let (speed, load) = record.inputs(None);
                 let bins = bins::adaptive(record, radius_m, &speed, &load);
-                let plan = Plan::new(record, &bins, radius_m, &speed, &load);
-                let samples = Plan::new(record, &bins::single(record), radius_m, &speed, &load);
-                (bins, (plan, samples))
+                let plans = |load: &[f64]| {
+                    let plan = Plan::new(record, &bins, radius_m, &speed, load);
+                    (plan, Plan::new(record, &bins::single(record), radius_m, &speed, load))
+                };
+                let restored = restored::load(record, rig, &load).map(|load| plans(&load));
+                let (plan, samples) = plans(&load);
+                ((bins, restored), (plan, samples))
             })
             .collect();
-        let (bins, plans): (Vec<Vec<Bin>>, Vec<(Plan, Plan)>) = prepared.into_iter().unzip();
-        let (plans, sample_plans): (Vec<Plan>, Vec<Plan>) = plans.into_iter().unzip();
+        type Both<A, B> = (Vec<A>, Vec<B>);
+        let (bins, plans): Both<_, (Plan, Plan)> = prepared.into_iter().unzip();
+        let (bins, restored_plans): Both<Vec<Bin>, Option<(Plan, Plan)>> = bins.into_iter().unzip();
+        let (plans, sample_plans): Both<Plan, Plan> = plans.into_iter().unzip();
         let measured_nm = records
             .iter()
             .zip(&bins)
@@ -132,23 +145,63 @@ impl Problem {
             measured_nm,
             plans,
             sample_plans,
+            restored_plans,
             records,
             scales,
             witness,
             holdout_witness,
             fits: Mutex::new(HashMap::new()),
+            nominal: OnceLock::new(),
         };
         problem.sigma_nm = problem.weights(&problem.baseline.clone())?;
         let first = problem.fit(&Vec::new(), None).ok_or_else(|| {
             InputError::new("the baseline has no finite prediction for these logs").file(file.source.as_str())
         })?;
         let fitted = problem.model_with(&first, 0, 0.0);
-        problem.sigma_nm = problem.weights(&fitted)?;
+        problem.sigma_nm = worse(problem.sigma_nm.clone(), problem.weights(&fitted)?);
+        problem.scales.ring_peaks_hz = problem.ring_peaks(&fitted)?;
         problem.baseline = ContactModel { effects: Vec::new(), ..fitted };
         problem.scales.stiffness_n_per_m = problem.baseline.parameter("k_u_n_per_m").unwrap_or(3e4);
         problem.fits.lock().map_err(|_| InputError::new("a fit was interrupted"))?.clear();
         problem.fit(&Vec::new(), Some(&first));
+        if let Some(nominal) = problem.as_given(file) {
+            // It is set once, here.
+            let _ = problem.nominal.set(nominal);
+        }
         Ok(problem)
+    }
+
+    /// Where the friction channel may ring.
+    fn ring_peaks(&self, model: &ContactModel) -> Result<Vec<f64>, InputError> {
+        let residuals = (0..self.training())
+            .map(|log| {
+                let smooth = self.run_samples(model, log)?.true_nm;
+                let measured = &self.records[log].friction_nm.values;
+                Ok(measured.iter().zip(&smooth).map(|(m, p)| m - p).collect())
+            })
+            .collect::<Result<Vec<Vec<f64>>, InputError>>()?;
+        let steps = self.records.iter().map(|record| record.step_s);
+        let with_steps: Vec<(&[f64], f64)> = residuals.iter().map(Vec::as_slice).zip(steps).collect();
+        Ok(ringing::peaks(&with_steps))
+    }
+
+    /// The given model as a point of the search.
+    fn as_given(&self, file: &ModelFile) -> Option<Fitted> {
+        let given = ContactModel::new(file);
+        let slots = self.slots(&Vec::new());
+        let values: Vec<f64> = slots
+            .iter()
+            .map(|slot| {
+                let value = given.parameter(&slot.parameter.name).unwrap_or(0.0);
+                value.clamp(slot.parameter.low, slot.parameter.high)
+            })
+            .collect();
+        let parameters: Vec<Parameter> = slots.iter().map(|slot| slot.parameter.clone()).collect();
+        let combination = Vec::new();
+        let residuals = |values: &[f64]| self.residuals(&combination, &slots, values);
+        let mut point = Point::at(values, &residuals)?;
+        point.differentiate(&parameters, &residuals);
+        Some(Fitted { combination: Vec::new(), slots, point })
     }
 
     /// Number of training logs.
@@ -158,12 +211,16 @@ impl Problem {
 
     /// Runs a model over the bins of a record.
     pub fn run(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
-        model.run(&self.rig, &self.plans[log], self.first_nm(log))
+        let restored = self.restored_plans[log].as_ref().filter(|_| model.restored_load);
+        let plan = restored.map_or(&self.plans[log], |plans| &plans.0);
+        model.run(&self.rig, plan, self.first_nm(log))
     }
 
     /// Runs a model over the samples of a record.
     pub fn run_samples(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
-        model.run(&self.rig, &self.sample_plans[log], self.first_nm(log))
+        let restored = self.restored_plans[log].as_ref().filter(|_| model.restored_load);
+        let plan = restored.map_or(&self.sample_plans[log], |plans| &plans.1);
+        model.run(&self.rig, plan, self.first_nm(log))
     }
 
     /// What the friction channel shows when a record begins.
@@ -238,14 +295,19 @@ impl Problem {
         let changes = around(&changes, 3, |window| window.iter().copied().fold(0.0, f64::max));
         let own = record.friction_nm.noise_std.max(1e-9);
         let stuck = self.stuck(model, log);
+        let (_, load) = record.inputs(None);
         let sigma = self.bins[log].iter().enumerate().map(|(i, bin)| {
             let samples = bin.from..bin.to;
-            let tells = samples.clone().all(|k| !record.friction_nm.clipped(k) && !stuck[k]);
+            let tells = samples.clone().all(|k| !stuck[k]);
             if !tells || spread[i].sqrt() > BLIND * own {
                 return f64::NAN;
             }
             let timing = (LATENESS * changes[i]).powi(2) + (RING_PHASE * ringing[i]).powi(2);
-            (own * own / bin.len() as f64 + spread[i] + timing).sqrt()
+            // Far below sliding friction the element is held by its rubber, from a level that is uncertain.
+            let sliding_nm = self.scales.friction * bin.mean(&load).max(0.0) * self.rig.friction_radius_m;
+            let depth = (1.0 - self.measured_nm[log][i].abs() / (0.9 * sliding_nm).max(1e-9)).clamp(0.0, 1.0);
+            let level = (LEVEL * depth * sliding_nm).powi(2);
+            (own * own / bin.len() as f64 + spread[i] + timing + level).sqrt()
         });
         Ok(sigma.collect())
     }
@@ -424,6 +486,22 @@ impl Problem {
             }
             [(id, variant)] => {
                 starts.extend(self.starts_of(combination, &slots, &base, near, (*id, *variant)));
+                // Without the effect the baseline may have been bent far out of shape; the way back from
+                // there is longer than from the model as it was given.
+                if let (1, Some(nominal)) = (combination.len(), self.nominal.get()) {
+                    let at = |slot: &Slot| {
+                        nominal
+                            .slots
+                            .iter()
+                            .position(|s| slot.effect.is_none() && s.parameter.name == slot.parameter.name)
+                    };
+                    let base: Vec<f64> = slots
+                        .iter()
+                        .map(|slot| at(slot).map_or(slot.parameter.start, |at| nominal.point.values[at]))
+                        .collect();
+                    let own = (*id, *variant);
+                    starts.extend(self.starts_of(combination, &slots, &base, Some(nominal), own));
+                }
             }
             _ => return None,
         }
@@ -662,6 +740,13 @@ impl Problem {
     }
 }
 
+/// The larger of two expected deviations of each bin; masked where either is.
+fn worse(a: Vec<Vec<f64>>, b: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let larger = |(a, b): (f64, f64)| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+    let logs = a.into_iter().zip(b);
+    logs.map(|(a, b)| a.into_iter().zip(b).map(larger).collect()).collect()
+}
+
 /// Each value replaced by a statistic of its neighbours within `half` samples.
 fn around(values: &[f64], half: usize, statistic: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     let window = |i: usize| &values[i.saturating_sub(half)..(i + half + 1).min(values.len())];
@@ -675,10 +760,13 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
         distance_m: 0.0,
         power_w: 0.0,
         load_n: 1.0,
+        friction: 0.0,
         torque_nm: 1e-3,
         speed_m_s: (0.01, 1.0),
         step_s: records.iter().map(|r| r.step_s).fold(0.0, f64::max),
-        friction_ends_nm: None,
+        friction_ends_nm: (None, None),
+        normal_clips: false,
+        ring_peaks_hz: Vec::new(),
         ring_hz: rig.friction_bridge.mode.map(|mode| mode.mode_hz),
         ring_damping: rig.friction_bridge.mode.map(|mode| mode.damping_ratio),
         stiffness_n_per_m: match baseline.kind {
@@ -686,10 +774,15 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
             _ => 3e4,
         },
     };
-    let (mut speeds, mut loads) = (Vec::new(), Vec::new());
+    let (mut speeds, mut loads, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
     let (mut squares, mut work_j, mut sliding_s, mut count) = (0.0, 0.0, 0.0, 0usize);
     for record in records {
+        let (low, high) = &mut scales.friction_ends_nm;
+        let own = record.friction_nm.clipping;
+        *low = own.low.map(|end| low.map_or(end, |known| known.min(end))).or(*low);
+        *high = own.high.map(|end| high.map_or(end, |known| known.max(end))).or(*high);
         let (speed, load) = record.inputs(None);
+        scales.normal_clips |= restored::load(record, rig, &load).is_some();
         let mut distance_m = 0.0;
         for i in 0..record.len() {
             let (v, torque) = (radius_m * speed[i], record.friction_nm.values[i]);
@@ -701,6 +794,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
             }
             if v.abs() > 2e-3 && load[i] > 1.0 {
                 speeds.push(v.abs());
+                coefficients.push(torque.abs() / radius_m / load[i]);
                 work_j += (torque * speed[i]).abs() * record.step_s;
                 sliding_s += record.step_s;
             }
@@ -712,6 +806,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
         let rank = ((values.len().max(1) - 1) as f64 * share) as usize;
         if values.is_empty() { None } else { Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1) }
     };
+    scales.friction = quantile(&mut coefficients, 0.5).unwrap_or(0.0);
     scales.load_n = quantile(&mut loads, 0.5).unwrap_or(1.0);
     if let (Some(low), Some(high)) = (quantile(&mut speeds, 0.05), quantile(&mut speeds, 0.95)) {
         scales.speed_m_s = (low, high.max(2.0 * low));

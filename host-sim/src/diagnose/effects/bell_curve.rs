@@ -19,7 +19,9 @@ impl ContactEffect for BellCurve {
         vec![
             Parameter::linear("height", 0.0, 0.0, 5.0),
             Parameter::logarithmic("peak_m_s", (low * high).sqrt(), low, high),
-            Parameter::logarithmic("width", 1.0, 0.3, 4.0),
+            Parameter::logarithmic("rise_width", 1.0, 0.3, 6.0),
+            Parameter::logarithmic("fall_width", 1.0, 0.3, 6.0),
+            Parameter::logarithmic("tail", 3.0, 0.3, 50.0),
         ]
     }
 
@@ -29,7 +31,7 @@ impl ContactEffect for BellCurve {
         for share in [0.15, 0.35, 0.5, 0.65, 0.85] {
             for width in [0.8, 1.8] {
                 let peak_m_s = low.powf(1.0 - share) * high.powf(share);
-                starts.push(Start::shape(&[0.0, peak_m_s, width], &[0]));
+                starts.push(Start::shape(&[0.0, peak_m_s, width, width, 3.0], &[0]));
             }
         }
         starts

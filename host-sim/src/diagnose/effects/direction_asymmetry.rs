@@ -15,12 +15,18 @@ impl ContactEffect for DirectionAsymmetry {
         "direction_asymmetry"
     }
 
-    fn parameters(&self, _variant: usize, _scales: &Scales) -> Vec<Parameter> {
-        vec![Parameter::linear("asymmetry", 0.0, -0.8, 0.8)]
+    fn parameters(&self, _variant: usize, scales: &Scales) -> Vec<Parameter> {
+        let (low, high) = scales.speed_m_s;
+        vec![
+            Parameter::linear("asymmetry_slow", 0.0, -0.9, 0.9),
+            Parameter::linear("asymmetry_fast", 0.0, -0.9, 0.9),
+            Parameter::logarithmic("between_m_s", (low * high).sqrt(), 0.1 * low, 3.0 * high),
+        ]
     }
 
-    fn starts(&self, _variant: usize, _scales: &Scales) -> Vec<Start> {
-        vec![Start::shape(&[0.0], &[0])]
+    fn starts(&self, _variant: usize, scales: &Scales) -> Vec<Start> {
+        let (low, high) = scales.speed_m_s;
+        vec![Start::shape(&[0.0, 0.0, (low * high).sqrt()], &[0, 1])]
     }
 
     fn apply(

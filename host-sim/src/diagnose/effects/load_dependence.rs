@@ -14,12 +14,15 @@ impl ContactEffect for LoadDependence {
         "load_dependence"
     }
 
-    fn parameters(&self, _variant: usize, _scales: &Scales) -> Vec<Parameter> {
-        vec![Parameter::linear("exponent", 0.0, -0.9, 0.9)]
+    fn parameters(&self, _variant: usize, scales: &Scales) -> Vec<Parameter> {
+        vec![
+            Parameter::linear("exponent", 0.0, -0.9, 0.9),
+            Parameter::logarithmic("offset_n", scales.load_n, 1e-2 * scales.load_n, 30.0 * scales.load_n),
+        ]
     }
 
-    fn starts(&self, _variant: usize, _scales: &Scales) -> Vec<Start> {
-        vec![Start::shape(&[0.0], &[0])]
+    fn starts(&self, _variant: usize, scales: &Scales) -> Vec<Start> {
+        [0.02, 0.6, 6.0].map(|share| Start::shape(&[0.0, share * scales.load_n], &[0])).to_vec()
     }
 
     fn apply(
@@ -30,6 +33,6 @@ impl ContactEffect for LoadDependence {
         scales: &Scales,
         model: &mut ContactModel,
     ) {
-        model.set(Extension::LoadDependence, vec![values[0], scales.load_n]);
+        model.set(Extension::LoadDependence, vec![values[0], scales.load_n, values[1]]);
     }
 }

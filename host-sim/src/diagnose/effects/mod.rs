@@ -35,14 +35,20 @@ pub struct Scales {
     pub power_w: f64,
     /// Median normal force in contact, N.
     pub load_n: f64,
+    /// Median friction coefficient while sliding.
+    pub friction: f64,
     /// Friction torque, RMS, N·m.
     pub torque_nm: f64,
     /// Low and high end of the sliding speeds (5 % and 95 % of the sliding samples), m/s.
     pub speed_m_s: (f64, f64),
     /// Sampling step, s.
     pub step_s: f64,
-    /// Ends of the friction channel where it clips, N·m.
-    pub friction_ends_nm: Option<(f64, f64)>,
+    /// Lowest and highest value of the friction channel where it clips, N·m.
+    pub friction_ends_nm: (Option<f64>, Option<f64>),
+    /// Whether the normal bridge clips and the load beyond its end is known from M1.
+    pub normal_clips: bool,
+    /// Frequencies at which the friction channel may ring, the most striking first, Hz.
+    pub ring_peaks_hz: Vec<f64>,
     /// Mode of the torque ring by the rig file, Hz.
     pub ring_hz: Option<f64>,
     /// Damping ratio of that mode.

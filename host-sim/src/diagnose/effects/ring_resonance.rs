@@ -31,6 +31,9 @@ impl ContactEffect for RingResonance {
                 starts.push(Start::whole(&[mode_hz, 0.04]));
             }
         }
+        for mode_hz in scales.ring_peaks_hz.iter().filter(|hz| **hz < 0.98 * highest) {
+            starts.extend([0.006, 0.03].map(|damping_ratio| Start::whole(&[*mode_hz, damping_ratio])));
+        }
         starts
     }
 

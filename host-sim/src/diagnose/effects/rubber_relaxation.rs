@@ -1,6 +1,6 @@
 //! The block creeps ([`model_core::extension::rubber_relaxation`]).
 //!
-//! Signature: after a stop the held force sinks with one time constant, and starts and reversals wind up more
+//! Signature: after a stop the held force sinks over seconds, and starts and reversals wind up more
 //! slowly than a single spring and damper can. Rivals: the elastic block itself, whose k_u and c_u are
 //! refitted; ageing, which raises the next breakaway instead.
 
@@ -16,15 +16,20 @@ impl ContactEffect for RubberRelaxation {
     }
 
     fn parameters(&self, _variant: usize, _scales: &Scales) -> Vec<Parameter> {
+        // Compliance of each creeping branch over that of the block, and its time.
+        let ratio = |name| Parameter::linear(name, 0.0, 0.0, 10.0);
         vec![
-            // Compliance of the creeping branch over that of the block.
-            Parameter::linear("creep_ratio", 0.0, 0.0, 10.0),
-            Parameter::logarithmic("relaxation_s", 0.2, 5e-3, 20.0),
+            ratio("creep_ratio"),
+            Parameter::logarithmic("relaxation_s", 0.02, 3e-3, 0.2),
+            ratio("creep_ratio_2"),
+            Parameter::logarithmic("relaxation_2_s", 0.2, 0.02, 2.0),
+            ratio("creep_ratio_3"),
+            Parameter::logarithmic("relaxation_3_s", 2.0, 0.2, 30.0),
         ]
     }
 
     fn starts(&self, _variant: usize, _scales: &Scales) -> Vec<Start> {
-        [0.02, 0.06, 0.2, 0.6, 2.0].map(|relaxation_s| Start::shape(&[0.0, relaxation_s], &[0])).to_vec()
+        [0.5, 1.5].map(|f| Start::shape(&[0.0, 0.02 * f, 0.0, 0.2 * f, 0.0, 1.5 * f], &[0, 2, 4])).to_vec()
     }
 
     fn apply(
@@ -35,7 +40,8 @@ impl ContactEffect for RubberRelaxation {
         scales: &Scales,
         model: &mut ContactModel,
     ) {
-        let stiffness = (scales.stiffness_n_per_m / values[0].max(1e-6)).clamp(1.0, 1e10);
-        model.set(Extension::RubberRelaxation, vec![stiffness, values[1]]);
+        let stiffness = |ratio: f64| (scales.stiffness_n_per_m / ratio.max(1e-9)).clamp(1.0, 1e12);
+        let branches = values.chunks_exact(2).flat_map(|branch| [stiffness(branch[0]), branch[1]]);
+        model.set(Extension::RubberRelaxation, branches.collect());
     }
 }
