@@ -10,6 +10,7 @@ pub mod output;
 pub mod plan;
 pub mod problem;
 pub mod restored;
+pub mod ringdown;
 pub mod ringing;
 pub mod witness;
 

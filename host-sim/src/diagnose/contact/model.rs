@@ -152,6 +152,12 @@ impl ContactModel {
         Ok(torques)
     }
 
+    /// Frequency and damping ratio of the ring, where the effects have one.
+    pub fn ring(&self) -> Option<(f64, f64)> {
+        let ring = self.effects.iter().find(|(extension, _)| *extension == Extension::RingResonance);
+        ring.and_then(|(_, values)| Some((*values.first()?, *values.get(1)?)))
+    }
+
     fn delay_s(&self) -> f64 {
         let delay = self.effects.iter().find(|(extension, _)| *extension == Extension::FrictionDelay);
         delay.and_then(|(_, values)| values.first().copied()).unwrap_or(0.0)

@@ -21,7 +21,7 @@ use super::bins::{self, Bin};
 use super::model::{ContactModel, Torques};
 use super::plan::Plan;
 use super::witness::DriveWitness;
-use super::{restored, ringing};
+use super::{restored, ringdown, ringing};
 use crate::diagnose::analysis::Role;
 use crate::files::model_file::{ModelFile, ModelKind};
 use crate::files::rig_file::RigFile;
@@ -213,14 +213,25 @@ impl Problem {
     pub fn run(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
         let restored = self.restored_plans[log].as_ref().filter(|_| model.restored_load);
         let plan = restored.map_or(&self.plans[log], |plans| &plans.0);
-        model.run(&self.rig, plan, self.first_nm(log))
+        let mut torques = model.run(&self.rig, plan, self.first_nm(log))?;
+        if let (Some(ring), Some(sigma)) = (model.ring(), self.sigma_nm.get(log)) {
+            ringdown::add(&plan.time_s, &self.measured_nm[log], sigma, &mut torques.shown_nm, ring);
+        }
+        Ok(torques)
     }
 
     /// Runs a model over the samples of a record.
     pub fn run_samples(&self, model: &ContactModel, log: usize) -> Result<Torques, InputError> {
         let restored = self.restored_plans[log].as_ref().filter(|_| model.restored_load);
         let plan = restored.map_or(&self.sample_plans[log], |plans| &plans.1);
-        model.run(&self.rig, plan, self.first_nm(log))
+        let mut torques = model.run(&self.rig, plan, self.first_nm(log))?;
+        if let (Some(ring), Some(sigma)) = (model.ring(), self.sigma_nm.get(log)) {
+            let bins = self.bins[log].iter().zip(sigma);
+            let sigma: Vec<f64> = bins.flat_map(|(bin, s)| std::iter::repeat_n(*s, bin.len())).collect();
+            let measured = &self.records[log].friction_nm.values;
+            ringdown::add(&plan.time_s, measured, &sigma, &mut torques.shown_nm, ring);
+        }
+        Ok(torques)
     }
 
     /// What the friction channel shows when a record begins.

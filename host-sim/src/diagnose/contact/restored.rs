@@ -20,8 +20,8 @@ pub fn load(record: &Record, rig: &RigFile, load_n: &[f64]) -> Option<Vec<f64>> 
     let mut press =
         SecondOrder::new(rig.pressure.mode_hz, rig.pressure.damping_ratio, torque.first().copied()?);
     let mut pressed = vec![torque[0]];
-    for i in 1..record.len() {
-        pressed.push(press.step(record.time_s[i] - record.time_s[i - 1], torque[i]));
+    for (times, torque_nm) in record.time_s.windows(2).zip(torque.iter().skip(1)) {
+        pressed.push(press.step(times[1] - times[0], *torque_nm));
     }
     let (mut n, mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     // The upper half of the range: a press lifted off does not follow the same line.
