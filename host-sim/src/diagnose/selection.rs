@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::analysis::{Analysis, Fit, Role};
-use super::score::{Independent, Score, likelihood_ratio, score};
+use super::score::{EFFECT_PRICE, Independent, Score, likelihood_ratio, score};
 use super::screening::estimated_gain;
 
 /// Combinations that go on into the next round.
@@ -29,8 +29,12 @@ const MATERIAL_SHARE: f64 = 0.05;
 const LEAST_ESTIMATE: f64 = 3.0;
 /// Effects tried beside others, those with the largest estimates.
 const MOST_TRIED: usize = 6;
-/// Share of the training gain per sample that an effect must show on held-out logs.
+/// Share of the training gain per sample that an effect must show on held-out logs, where its gain there is
+/// not worth the effect's price by itself.
 const CONFIRMED_SHARE: f64 = 0.2;
+
+/// Growth of the held-out error at which an effect does harm there, whatever single samples gain.
+const HARM: f64 = 1.02;
 
 /// A combination of effects, sorted.
 pub type Combination = Vec<&'static str>;
@@ -247,7 +251,10 @@ impl Search<'_> {
                 let (held, _) = likelihood_ratio(less, &full, Role::Holdout, &held_out);
                 let per_value = trained / independent.total().max(1.0);
                 let has_holdout = held_out.total() > 0.0;
-                let confirmed = !has_holdout || held / held_out.total() >= CONFIRMED_SHARE * per_value;
+                let seen = held / held_out.total() >= CONFIRMED_SHARE * per_value || held > EFFECT_PRICE;
+                let harms = less.nrmse(Role::Holdout).zip(full.nrmse(Role::Holdout));
+                let harms = harms.is_some_and(|(less, full)| full > HARM * less);
+                let confirmed = !has_holdout || (seen && !harms);
                 let wanted = missed > 0.0 && share > MATERIAL_SHARE;
                 if !(wanted && confirmed) && weakest.is_none_or(|(least, ..)| missed < least) {
                     weakest = Some((missed, effect, wanted));

@@ -19,7 +19,7 @@ const BINS: usize = 20;
 /// Standard deviations.
 const LEVEL: f64 = 5.0;
 /// Structured variance that is tolerated, in units of the noise's variance.
-pub const TOLERATED_VARIANCE: f64 = 0.2;
+pub const TOLERATED_VARIANCE: f64 = 0.25;
 /// Structured error that is tolerated, relative to the signal's RMS.
 pub const TOLERATED_NRMSE: f64 = 1e-3;
 

@@ -113,14 +113,17 @@ pub fn judge<'a>(
     let tested = |fit: Option<&Fit>| fit.map_or(Vec::new(), |fit| structures(fit, Role::Train, coordinates));
     let before = tested(selection.baseline());
     let after = if selection.chosen.is_empty() { before.clone() } else { tested(selection.extended()) };
+    // In variances of each channel's noise: a rest in a witness counts against what was wrong anywhere.
+    let start = before.iter().map(|b| b.structured).fold(0.0, f64::max);
     let left = after.iter().any(|after| {
-        let start = before.iter().find(|b| b.channel == after.channel).map_or(0.0, |b| b.structured);
         after.is_material() && (selection.chosen.is_empty() || after.structured > LEFT_SHARE * start)
     });
-    let verdict = match (left, selection.chosen.is_empty()) {
-        (true, _) => Verdict::Unknown,
-        (false, true) => Verdict::None,
-        (false, false) => Verdict::Named,
+    let wrong = before.iter().any(Structure::is_material);
+    let verdict = match (wrong, left, selection.chosen.is_empty()) {
+        // What is significant and yet below any real model's imperfection is not worth a name.
+        (false, ..) | (true, false, true) => Verdict::None,
+        (true, true, _) => Verdict::Unknown,
+        (true, false, false) => Verdict::Named,
     };
     let mut judged = Judged {
         analysis,
@@ -205,6 +208,8 @@ impl Judged<'_> {
             let behind = best.penalised - score.penalised;
             let why = if selection.unconfirmed.contains(&id) {
                 "it gains on the training logs and less than a fifth of that on the held-out logs".to_string()
+            } else if self.verdict == Verdict::None && chosen.contains(&id) {
+                "it gains, but what the baseline leaves is within the imperfection that any model of a rig has".into()
             } else if !named && chosen.contains(&id) {
                 self.too_little(id)
             } else if chosen.is_empty() {
