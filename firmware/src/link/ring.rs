@@ -10,7 +10,8 @@
 
 use super::LINE_ERRORS;
 use crate::memory::{RECEIVED, RECEIVED_BYTES};
-use core::sync::atomic::Ordering::Relaxed;
+use core::sync::atomic::Ordering::{Acquire, Relaxed};
+use core::sync::atomic::fence;
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac::dma::vals::{Dir, Pl, Size};
 use embassy_stm32::pac::{DMA1, DMAMUX1, USART3};
@@ -60,6 +61,8 @@ impl Ring {
         loop {
             count_errors();
             let written = RECEIVED_BYTES - usize::from(DMA1.st(STREAM).ndtr().read().ndt());
+            // The bytes are read after the counter that says they are there.
+            fence(Acquire);
             let mut count = 0;
             for byte in bytes.iter_mut() {
                 if self.at == written % RECEIVED_BYTES {
