@@ -32,11 +32,12 @@ const BAD_INPUT: u8 = 2;
 Examples:
   cargo virtual-bench --experiment fig20 --out target/bench/fig20
   cargo virtual-bench --faults
+  cargo virtual-bench --write-budget
   cargo virtual-bench --experiment fig20 --observer model-extended.toml --out target/bench/extended
 
 An experiment writes log.csv (as the host tool recorded it from the serial link), capture.csv (two seconds at the full
 10 kHz around the step, read from the firmware's memory afterwards), summary.json (figures at the full rate where the
-capture has it) and defmt.log (the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
+capture has it; what the observer's model left unexplained) and defmt.log (the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
 Exit status: 0 on success, 2 for bad input, 1 for everything else."
 )]
 struct Cli {
