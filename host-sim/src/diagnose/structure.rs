@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn a_residual_with_the_sign_of_motion_is_seen_over_direction() {
         let coordinates = swinging();
-        let residual = white(6000, 5).iter().zip(&coordinates.direction).map(|(e, d)| e + 0.5 * d).collect();
+        let residual = white(6000, 5).iter().zip(&coordinates.direction).map(|(e, d)| e + 0.6 * d).collect();
         let found = structure_of(residual);
         let view = found.views.iter().find(|v| v.name == "direction").unwrap();
         assert!(found.is_material() && view.share > 0.15, "{view:?}");
