@@ -5,9 +5,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use host_sim::demo::{Part, demo, figure};
+use host_sim::demo::{demo, figure};
 use host_sim::files::log::Log;
-use host_sim::report::{Block, Role};
+use host_sim::report::Role;
 
 fn rig(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rig")).args(arguments).current_dir(folder).output().unwrap()
@@ -16,9 +16,7 @@ fn rig(arguments: &[&str], folder: &Path) -> Output {
 #[test]
 fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_byte() {
     let mut told = Vec::new();
-    let part =
-        Part { blocks: vec![Block::Text("added by a part".into())], lines: vec!["one more line".into()] };
-    let made = demo(|done, total, what| told.push((done, total, what.to_string())), &[part]).unwrap();
+    let made = demo(|done, total, what| told.push((done, total, what.to_string()))).unwrap();
     assert!(told.windows(2).all(|w| w[1].0 > w[0].0) && told.last().unwrap().0 == told[0].1, "{told:?}");
 
     let figure = figure::overshoot_svg(&made.runs).unwrap();
@@ -47,7 +45,10 @@ fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_
     }
 
     let html = made.page.to_html();
-    assert!(html.contains("added by a part") && made.table.contains("one more line"));
+    assert_eq!(made.story.diagnosis.verdict, "named", "{}", made.story.diagnosis.sentence);
+    assert_eq!(made.story.diagnosis.causes[0].id, "element_compliance");
+    assert!(made.story.diagnosis.extended.gain.unwrap() > 0.4, "{}", made.story.found());
+    assert!(html.contains("What a model without the block gets wrong"));
     for name in ["Fig. 18", "Fig. 21", "Fig. 22", "Fig. 23", "Fig. 26", "Fig. 27", "Five models at 120 rpm"] {
         assert!(html.contains(name), "{name}");
     }

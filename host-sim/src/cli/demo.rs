@@ -7,7 +7,7 @@ use crate::demo::{demo, figure};
 use crate::files::output_dir::OutputDir;
 use crate::input_error::InputError;
 
-/// Run the paper's experiments and write one page with all of them
+/// Run the paper's experiments, find what LuGre lacks in them, and write one page with all of it
 #[derive(clap::Args, Debug)]
 #[command(after_long_help = "\
 Example:
@@ -26,14 +26,11 @@ impl Demo {
     pub(super) fn run(self) -> Result<(), InputError> {
         let mut output = OutputDir::new(&self.out)?;
         let mut progress = None;
-        let made = demo(
-            |done, total, what| {
-                let bar = progress.get_or_insert_with(|| Progress::new("demo", total as u64));
-                bar.say(what);
-                bar.set(done as u64);
-            },
-            &[],
-        )?;
+        let made = demo(|done, total, what| {
+            let bar = progress.get_or_insert_with(|| Progress::new("demo", total as u64));
+            bar.say(what);
+            bar.set(done as u64);
+        })?;
         drop(progress);
         output.write("report.html", made.page.to_html())?;
         output.write("overshoot.svg", figure::overshoot_svg(&made.runs)?)?;

@@ -9,49 +9,43 @@ mod comparison;
 pub mod figure;
 mod findings;
 mod runs;
+pub mod story;
 
 pub use comparison::Comparison;
 pub use runs::{ClosedLoop, Runs};
+pub use story::Story;
 
 use crate::input_error::InputError;
 use crate::report::{Block, Page, Table};
-
-/// A part that another module adds to the page: its blocks, and rows for the table that is printed.
-#[derive(Debug, Clone, Default)]
-pub struct Part {
-    /// Goes between the comparison of the models and the findings.
-    pub blocks: Vec<Block>,
-    /// Lines for the terminal.
-    pub lines: Vec<String>,
-}
 
 /// Everything the demo made.
 #[derive(Debug, Clone)]
 pub struct Demo {
     /// The runs.
     pub runs: Runs,
+    /// The hidden effect.
+    pub story: Story,
     /// The page.
     pub page: Page,
     /// The short table for the terminal.
     pub table: String,
 }
 
-/// Runs everything. `progress` is told the steps done of all and what is done next; `parts` come from elsewhere.
+/// Runs everything. `progress` is told the steps done of all and what is done next.
 ///
 /// # Errors
 /// What a run refuses.
-pub fn demo(mut progress: impl FnMut(usize, usize, &str), parts: &[Part]) -> Result<Demo, InputError> {
+pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputError> {
     let runs = Runs::new(&mut progress)?;
-    let page = page(&runs, parts);
+    let story = Story::new(&runs)?;
+    progress(runs::STEPS, runs::STEPS, "report");
+    let page = page(&runs, &story);
     let mut table = terminal_table(&runs);
-    for line in parts.iter().flat_map(|part| &part.lines) {
-        table.push_str(line);
-        table.push('\n');
-    }
-    Ok(Demo { runs, page, table })
+    table.push_str(&format!("{:<8} {:<53} {}\n", "hidden", "what LuGre lacks in figs. 18–21", story.found()));
+    Ok(Demo { runs, story, page, table })
 }
 
-fn page(runs: &Runs, parts: &[Part]) -> Page {
+fn page(runs: &Runs, story: &Story) -> Page {
     let mut blocks = vec![
         Block::Heading("The experiments".into()),
         Block::Text(findings::experiments_sentence(runs)),
@@ -68,7 +62,7 @@ fn page(runs: &Runs, parts: &[Part]) -> Page {
     blocks.push(Block::Heading("Across the contact patch, and over speed".into()));
     blocks.push(Block::Chart(runs.crossing.chart()));
     blocks.push(Block::Chart(runs.sweep.chart()));
-    blocks.extend(parts.iter().flat_map(|part| part.blocks.clone()));
+    blocks.extend(story.blocks.iter().cloned());
     blocks.push(Block::Heading("What the paper says, and what was found".into()));
     blocks.push(Block::Table(findings::statements(runs)));
     blocks.push(Block::Heading("What is assumed".into()));

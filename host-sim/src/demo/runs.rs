@@ -20,6 +20,8 @@ use model_core::friction::series::SeriesParameters;
 const CLOSED_LOOP: [&str; 6] = ["fig18", "fig19", "fig20", "fig21", "fig22", "fig23"];
 /// Those in which friction overshoots.
 const LOAD_STEPS: usize = 4;
+/// Steps of the whole demo: experiments, comparisons, studies, the hidden effect.
+pub(super) const STEPS: usize = CLOSED_LOOP.len() + LOAD_STEPS + 3;
 
 /// One experiment in closed loop.
 #[derive(Debug, Clone)]
@@ -110,7 +112,7 @@ impl Runs {
         let model = ModelFile::assumed(&[])?;
         let rubber = rubber_of(&ElementParameters::from_file(&model))
             .ok_or_else(|| InputError::new("the assumed rubber is no series element"))?;
-        let total = CLOSED_LOOP.len() + LOAD_STEPS + 2;
+        let total = STEPS;
         let mut closed_loop = Vec::new();
         let mut comparisons = Vec::new();
         for (done, name) in CLOSED_LOOP.iter().enumerate() {
@@ -126,7 +128,7 @@ impl Runs {
             let speed = reference_speed(&experiment, rig.friction_radius_m);
             comparisons.push(Comparison::run(&experiment, &setup, &closed_loop[k], &rubber, speed)?);
         }
-        progress(total - 2, total, "fig26, fig27");
+        progress(total - 3, total, "fig26, fig27");
         let study = |name| ExperimentFile::named_or_read(name, &[]).map(|e| e.study);
         let named = |e: ParameterError| InputError::from(e).file("assumed rubber");
         let (Study::PatchCrossing(slip), Study::SpeedSweep(sweep)) = (study("fig26")?, study("fig27")?)
@@ -135,7 +137,7 @@ impl Runs {
         };
         let crossing = patch_crossing::run(&slip, &rubber).map_err(named)?;
         let sweep = speed_sweep::run(&sweep, &rubber).map_err(named)?;
-        progress(total, total, "report");
+        progress(total - 1, total, "the hidden effect");
         Ok(Self { closed_loop, comparisons, crossing, sweep, rubber })
     }
 
