@@ -27,6 +27,8 @@ use rigless::time::VirtualNanos;
 pub const PERIOD: u64 = 100_000;
 /// A branch to itself, Thumb.
 const ENDLESS_LOOP: u64 = 0xE7FE;
+/// `udf #0`: for ever undefined.
+const UNDEFINED: u64 = 0xDE00;
 
 /// Addresses the driver needs from the ELF.
 #[derive(Debug, Clone)]
@@ -196,16 +198,17 @@ impl BenchDriver {
                     let _ = host.program(at, Width::W64, u64::from_le_bytes(*eight));
                 }
             }
-            Action::HangTick => self.patch(self.addresses.tick_handler, host),
-            Action::HangThreads => self.patch(self.addresses.low_handler, host),
+            Action::HangTick => self.patch(self.addresses.tick_handler, ENDLESS_LOOP, host),
+            Action::TrapTick => self.patch(self.addresses.tick_handler, UNDEFINED, host),
+            Action::HangThreads => self.patch(self.addresses.low_handler, ENDLESS_LOOP, host),
         }
         self.show_outside(&mut session.board_mut().part, stop.at);
     }
 
-    /// Puts an endless loop where a handler begins; the next reset puts the handler back.
-    fn patch(&mut self, address: u64, host: &mut dyn Host) {
+    /// Puts an instruction where a handler begins; the next reset puts the handler back.
+    fn patch(&mut self, address: u64, instruction: u64, host: &mut dyn Host) {
         if let Ok(original) = host.read(address, Width::W16)
-            && host.program(address, Width::W16, ENDLESS_LOOP).is_ok()
+            && host.program(address, Width::W16, instruction).is_ok()
         {
             self.patched = Some((address, original));
         }

@@ -70,6 +70,8 @@ pub enum Action {
     ResetPin,
     /// The control tick's handler becomes an endless loop, until the next reset.
     HangTick,
+    /// The control tick's handler begins with an undefined instruction, until the next reset.
+    TrapTick,
     /// The handler of the link's DMA becomes an endless loop, until the next reset: threads starve, the tick goes on.
     HangThreads,
 }

@@ -133,6 +133,12 @@ pub(super) fn all() -> Vec<Case> {
         Told::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
     ));
     all.push(case(
+        "control tick traps",
+        &[Action::TrapTick],
+        0,
+        Told::Restart(ResetCause::Software, Some(Fault::HardFault)),
+    ));
+    all.push(case(
         "threads hang, the tick goes on",
         &[Action::HangThreads],
         THREADS_NS + WATCHDOG_NS,
@@ -235,8 +241,16 @@ pub(super) fn verdict(
     } else if !record.restarts.is_empty() {
         problems.push(format!("it restarted: {:?}", record.restarts));
     }
-    if let Some(kept) = &seen.kept {
-        problems.push(format!("it kept a message: {}", words::kept(kept, 10_000)));
+    // Only a trap leaves a message, which is in the log and over the link.
+    let trapped = matches!(case.told, Told::Restart(_, Some(Fault::HardFault)));
+    match &seen.kept {
+        Some(kept) if trapped && kept.text.starts_with("pc ") => {
+            if !log.lines.iter().any(|line| line.contains(kept.text.as_str())) {
+                problems.push(format!("the log does not have the kept message: {}", kept.text));
+            }
+        }
+        None if !trapped => {}
+        other => problems.push(format!("what it kept: {other:?}")),
     }
     if log.malformed > 0 {
         problems.push(format!("{} frames of the log could not be decoded", log.malformed));
