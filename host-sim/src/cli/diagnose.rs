@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::common::{SetArgs, say};
 use super::progress::Progress;
 use crate::diagnose::extended_model;
+use crate::diagnose::next_experiment;
 use crate::diagnose::page;
 use crate::diagnose::results::Diagnosis;
 use crate::diagnose::run::Case;
@@ -28,8 +29,8 @@ m2_angle_rad, or time_s, force_n, position_m) for the drive alone, and need no -
 is held out, the last part of each training log is.
 
 Writes diagnosis.json (verdict named, none or unknown; causes with probabilities, parameters and evidence;
-rejected rivals with reasons; errors on the held-out logs against the noise), model-extended.toml and
-report.html (opens in any browser, needs no network).")]
+rejected rivals with reasons; errors on the held-out logs against the noise), model-extended.toml,
+next-experiment.toml (for contact logs) and report.html (opens in any browser, needs no network).")]
 pub(super) struct Diagnose {
     /// Rig file (TOML); the assumed rig where left out
     #[arg(long, value_name = "RIG.toml")]
@@ -74,9 +75,9 @@ impl Diagnose {
         if judged.is_empty() {
             return Err(InputError::new(notes.join("; ")).key("--train"));
         }
-        let next = crate::diagnose::next_experiment::propose(&judged);
-        if let Some((name, text)) = &next.file {
-            output.write(name, text)?;
+        let next = next_experiment::propose(&judged, case.contact.is_some().then_some((&rig, &model)));
+        if let Some(text) = &next.file {
+            output.write(next_experiment::FILE, text)?;
         }
         let wall_s = started.elapsed().as_secs_f64();
         let diagnosis = Diagnosis::new(&judged, notes, next.sentence, wall_s);

@@ -1,63 +1,87 @@
 //! What to run next, from what is left open.
 //!
-//! For a named or rejected effect the experiment that shows it best, for two that are not told apart the one in which they
-//! differ: a few words, from the signature that each effect's file states.
+//! Two causes that the logs do not tell apart ask for the experiment in which they differ, a named cause for the one
+//! that shows it best, a clean log for one that excludes its closest rival. The choice is by the signatures of the causes;
+//! `rig design` looks for the best levels with the models themselves. Drives without contact have no experiment file: there
+//! is no rig whose limits are known.
 
 use super::verdict::{Judged, Verdict};
+use crate::design::family::{Family, Setting};
+use crate::design::text;
+use crate::files::model_file::ModelFile;
+use crate::files::rig_file::RigFile;
+
+/// Name of the experiment file.
+pub const FILE: &str = "next-experiment.toml";
+/// Share of the largest possible load.
+const LOAD_SHARE: f64 = 0.8;
+/// Speed of experiments that do not ask for a special one, rpm.
+const SPEED_RPM: f64 = 60.0;
+/// Holds, s.
+const HOLD_S: f64 = 1.5;
 
 /// A proposal.
 pub struct NextExperiment {
     /// One sentence.
     pub sentence: String,
-    /// Name and text of the file written for it.
-    pub file: Option<(&'static str, String)>,
+    /// The experiment file's text, for the rig.
+    pub file: Option<String>,
 }
 
-/// Proposes what to run next.
-pub fn propose(judged: &[Judged<'_>]) -> NextExperiment {
+/// Proposes what to run next; `contact` is the rig and its model where the logs have contact.
+pub fn propose(judged: &[Judged<'_>], contact: Option<(&RigFile, &ModelFile)>) -> NextExperiment {
     let pair = judged.iter().flat_map(|part| &part.indistinguishable).next();
     let named = judged.iter().filter(|p| p.verdict == Verdict::Named).flat_map(|p| &p.causes).next();
-    let closest = judged.iter().flat_map(|part| &part.rejected).next();
-    let sentence = match (pair, named, closest) {
-        (Some(pair), ..) => {
-            format!("to tell {} apart: {}", pair.join(" and "), motion(pair.last().copied().unwrap_or("")))
-        }
-        (None, Some(cause), _) => format!("to confirm {}: {}", cause.id, motion(cause.id)),
-        (None, None, Some(rival)) => format!("to exclude {}: {}", rival.id, motion(rival.id)),
-        _ => "repeat the motion at other speeds and loads".into(),
+    let closest = judged.iter().flat_map(|part| &part.rejected).find(|r| r.probability < 0.5);
+    let unknown = judged.iter().any(|part| part.verdict == Verdict::Unknown);
+    let (why, id) = match (pair, named, closest) {
+        (Some(pair), ..) => (format!("to tell {} apart", pair.join(" and ")), pair.last().copied()),
+        (None, Some(cause), _) => (format!("to confirm {}", cause.id), Some(cause.id)),
+        _ if unknown => ("to see what the rest follows".into(), None),
+        (None, None, Some(rival)) => (format!("to exclude {}", rival.id), Some(rival.id)),
+        _ => ("to look further".into(), None),
     };
-    NextExperiment { sentence, file: None }
+    let (motion, family) = experiment(id.unwrap_or(""));
+    let Some((rig, model)) = contact else {
+        return NextExperiment { sentence: format!("{why}: {motion}"), file: None };
+    };
+    let load_n = LOAD_SHARE * text::largest_load_n(rig, std::slice::from_ref(model));
+    let setting = Setting { family, load_n, speed_rpm: SPEED_RPM, hold_s: HOLD_S };
+    NextExperiment {
+        sentence: format!("{why}: {motion}; {FILE} holds {}", family.words()),
+        file: Some(text::toml("next", &why, &setting.course(), rig)),
+    }
 }
 
-fn motion(id: &str) -> &'static str {
+fn experiment(id: &str) -> (&'static str, Family) {
     match id {
-        "thermal_fade" => "slide fast under high load for 10 s, rest for 10 s, slide again: heat recovers",
-        "wear_drift" => "slide far at one slow speed and load, rest, slide again: wear does not recover",
-        "static_ageing" => "break away after rests of 0.1, 1 and 10 s at the same load",
+        "thermal_fade" => {
+            ("slide fast under high load, rest, slide again: heat goes", Family::SlideRestSlide)
+        }
+        "wear_drift" => ("slide far, rest, slide again: wear stays", Family::SlideRestSlide),
+        "bridge_drift" => ("rest with the elements lifted, again and again", Family::SlideRestSlide),
+        "static_ageing" => ("break away after rests of growing length at the same load", Family::Dwells),
         "disc_angle" | "m2_ripple" | "encoder_eccentricity" => {
-            "turn slowly at one speed for five revolutions, at two loads"
+            ("turn slowly, some revolutions forward and as many back", Family::ThereAndBack)
         }
-        "load_dependence" | "bridge_crosstalk" => {
-            "hold one speed in each direction and step through five loads"
+        "load_dependence" | "lever_hysteresis" | "foil_hardening" | "m1_ripple" | "adc_saturation" => {
+            ("step through the whole range of loads, up and down", Family::LoadStaircase)
         }
-        "direction_asymmetry" | "bearing_asymmetry" | "torque_offset" => {
-            "the same ramp of speed in both directions, at rest between"
+        "bridge_crosstalk" => ("press at standstill, turn without load, then both", Family::PressThenTurn),
+        "direction_asymmetry"
+        | "bearing_asymmetry"
+        | "torque_offset"
+        | "bell_curve"
+        | "bearing_stribeck"
+        | "viscous_film" => {
+            ("step through the whole range of speeds, in both directions", Family::SpeedStaircase)
         }
-        "bell_curve" | "bearing_stribeck" => {
-            "a slow ramp of speed from rest through the whole range, up and down"
+        "element_compliance" | "friction_delay" | "ring_resonance" => {
+            ("steps of load while the disc turns", Family::LoadSteps)
         }
-        "viscous_film" => "a slow ramp of speed at two loads: a film does not scale with load",
-        "element_compliance" | "rubber_relaxation" => {
-            "load steps under torque below breakaway, and slow sines of torque"
+        "rubber_relaxation" | "presliding" | "backlash" | "drive_delay" | "shaft_torsion" => {
+            ("reversals of growing frequency", Family::Reversals)
         }
-        "friction_delay" | "ring_resonance" | "drive_delay" | "shaft_torsion" => {
-            "sines of speed from 2 to 60 Hz at small amplitude"
-        }
-        "bridge_drift" => "one slow speed and one load for 60 s, with the elements lifted every 10 s",
-        "presliding" | "backlash" => "reversals of small amplitude at several speeds",
-        "lever_hysteresis" | "foil_hardening" | "m1_ripple" => {
-            "a slow triangle of M1's torque over its whole range, without sliding"
-        }
-        _ => "the same motion at half and at twice the load",
+        _ => ("the same motion at other loads", Family::LoadStaircase),
     }
 }
