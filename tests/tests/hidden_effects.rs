@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use host_sim::diagnose::analysis::Role;
+use host_sim::diagnose::lines;
 use host_sim::diagnose::results::Diagnosis;
 use host_sim::diagnose::run::Case;
 use host_sim::files::log::Log;
@@ -29,7 +30,7 @@ fn diagnose(scenario: &Scenario) -> Answer {
     let case = Case::new(train, holdout, &rig, &model).unwrap();
     assert!(case.logs.iter().any(|(_, role)| *role == Role::Holdout));
     let (judged, notes) = case.judge(&|_| ());
-    let diagnosis = Diagnosis::new(&judged, notes, String::new(), 0.0);
+    let diagnosis = Diagnosis::new(&judged, &lines::find(&case.logs), notes, String::new(), 0.0);
     Answer::parse(&serde_json::to_string(&diagnosis).unwrap()).unwrap()
 }
 

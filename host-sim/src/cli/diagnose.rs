@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::common::{SetArgs, say};
 use super::progress::Progress;
 use crate::diagnose::extended_model;
+use crate::diagnose::lines;
 use crate::diagnose::next_experiment;
 use crate::diagnose::page;
 use crate::diagnose::results::Diagnosis;
@@ -79,8 +80,9 @@ impl Diagnose {
         if let Some(text) = &next.file {
             output.write(next_experiment::FILE, text)?;
         }
+        let lines = lines::find(&case.logs);
         let wall_s = started.elapsed().as_secs_f64();
-        let diagnosis = Diagnosis::new(&judged, notes, next.sentence, wall_s);
+        let diagnosis = Diagnosis::new(&judged, &lines, notes, next.sentence, wall_s);
         output.write_json("diagnosis.json", &diagnosis)?;
         output.write("model-extended.toml", extended_model::text(&judged, case.contact.as_deref())?)?;
         output.write("report.html", page::page(&diagnosis, &judged).to_html())?;

@@ -13,14 +13,14 @@ use crate::files::number;
 use crate::input_error::InputError;
 
 /// The file's text. `contact` is the analysis of the contact where the logs have one.
-pub fn text(judged: &[Judged<'_>], contact: Option<&ContactAnalysis>) -> Result<String, InputError> {
+pub fn text(judged: &[Judged], contact: Option<&ContactAnalysis>) -> Result<String, InputError> {
     match contact {
         Some(contact) => with_contact(judged, contact),
         None => Ok(drive(judged)),
     }
 }
 
-fn with_contact(judged: &[Judged<'_>], contact: &ContactAnalysis) -> Result<String, InputError> {
+fn with_contact(judged: &[Judged], contact: &ContactAnalysis) -> Result<String, InputError> {
     let friction = judged.iter().find(|part| part.analysis.subsystem() == Subsystem::Friction);
     let Some(fit) = friction.and_then(Judged::result) else { return Ok(drive(judged)) };
     let mut extended = contact.to_model_file(fit)?;
@@ -38,7 +38,7 @@ fn extension(fit: &Fit, id: &str) -> Extension {
     Extension { id: id.into(), parameters: own.map(|p| (p.name.clone(), p.value)).collect() }
 }
 
-fn drive(judged: &[Judged<'_>]) -> String {
+fn drive(judged: &[Judged]) -> String {
     let mut text = "kind = \"drive\"\n".to_string();
     for part in judged {
         let Some(fit) = part.result() else { continue };

@@ -11,6 +11,7 @@ pub mod coordinates;
 pub mod drive;
 pub mod effects;
 pub mod extended_model;
+pub mod lines;
 pub mod next_experiment;
 pub mod noise;
 pub mod page;

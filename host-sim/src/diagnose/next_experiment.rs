@@ -29,7 +29,7 @@ pub struct NextExperiment {
 }
 
 /// Proposes what to run next; `contact` is the rig and its model where the logs have contact.
-pub fn propose(judged: &[Judged<'_>], contact: Option<(&RigFile, &ModelFile)>) -> NextExperiment {
+pub fn propose(judged: &[Judged], contact: Option<(&RigFile, &ModelFile)>) -> NextExperiment {
     let pair = judged.iter().flat_map(|part| &part.indistinguishable).next();
     let named = judged.iter().filter(|p| p.verdict == Verdict::Named).flat_map(|p| &p.causes).next();
     let closest = judged.iter().flat_map(|part| &part.rejected).find(|r| r.probability < 0.5);

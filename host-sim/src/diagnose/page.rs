@@ -15,7 +15,7 @@ const COARSE: f64 = 1e-3;
 const CLOSE_S: f64 = 2.0;
 
 /// The page.
-pub fn page(diagnosis: &Diagnosis, judged: &[Judged<'_>]) -> Page {
+pub fn page(diagnosis: &Diagnosis, judged: &[Judged]) -> Page {
     let mut blocks = vec![Block::Table(figures(diagnosis))];
     if !diagnosis.causes.is_empty() {
         blocks.push(Block::Heading("Causes".into()));
@@ -94,7 +94,7 @@ fn ranking(diagnosis: &Diagnosis) -> Table {
     }
 }
 
-fn subsystem(part: &Judged<'_>, blocks: &mut Vec<Block>) {
+fn subsystem(part: &Judged, blocks: &mut Vec<Block>) {
     let name = part.analysis.subsystem().name();
     let (Some(base), Some(result)) = (part.selection.baseline(), part.result()) else { return };
     blocks.push(Block::Heading(format!("{}{}", name[..1].to_uppercase(), &name[1..])));

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::analysis::{Fit, Role};
+use super::lines::SpectralLine;
 use super::structure::{Structure, View};
 use super::verdict::{Judged, Verdict};
 
@@ -113,6 +114,8 @@ pub struct Diagnosis {
     pub extended: Extended,
     pub next_experiment: String,
     pub subsystems: BTreeMap<&'static str, SubsystemResult>,
+    /// Lines in the channels' spectra that nothing in the rig makes.
+    pub lines: Vec<String>,
     /// What was assumed about the input.
     pub notes: Vec<String>,
     /// Time that the diagnosis took.
@@ -147,7 +150,7 @@ impl ChannelResult {
 
 impl SubsystemResult {
     /// From what was judged.
-    pub fn new(judged: &Judged<'_>) -> Self {
+    pub fn new(judged: &Judged) -> Self {
         let base = judged.selection.baseline();
         let result = judged.result();
         let nrmse = |fit: Option<&Fit>, role| fit.and_then(|fit| fit.nrmse(role));
@@ -174,14 +177,14 @@ impl SubsystemResult {
 }
 
 /// The views that say most about what is left.
-pub fn telling_views<'a>(judged: &'a Judged<'_>) -> impl Iterator<Item = (&'static str, &'a View)> {
-    judged.after.iter().filter(|s| s.is_material()).flat_map(|s| {
-        let telling = s.views.iter().filter(|v| v.deviations > 5.0 && v.share > 0.02);
+pub fn telling_views<'a>(judged: &'a Judged) -> impl Iterator<Item = (&'static str, &'a View)> {
+    judged.after.iter().take(1).filter(|s| s.is_material()).flat_map(|s| {
+        let telling = s.views.iter().filter(|v| v.deviations > 2.0 && v.share > 0.05);
         telling.take(MOST_VIEWS).map(|v| (s.channel, v))
     })
 }
 
-fn correlations(judged: &Judged<'_>) -> Vec<Correlation> {
+fn correlations(judged: &Judged) -> Vec<Correlation> {
     telling_views(judged)
         .map(|(channel, v)| Correlation {
             channel: channel.to_string(),
@@ -193,8 +196,14 @@ fn correlations(judged: &Judged<'_>) -> Vec<Correlation> {
 
 impl Diagnosis {
     /// Puts the subsystems together.
-    pub fn new(judged: &[Judged<'_>], notes: Vec<String>, next_experiment: String, wall_s: f64) -> Self {
-        let verdict = overall(judged);
+    pub fn new(
+        judged: &[Judged],
+        lines: &[SpectralLine],
+        notes: Vec<String>,
+        next_experiment: String,
+        wall_s: f64,
+    ) -> Self {
+        let verdict = if lines.is_empty() { overall(judged) } else { Verdict::Unknown };
         let mut ranked: Vec<(f64, Cause)> = Vec::new();
         for part in judged.iter().filter(|_| verdict == Verdict::Named) {
             for cause in &part.causes {
@@ -215,7 +224,7 @@ impl Diagnosis {
         let groups = judged.iter().flat_map(|part| &part.indistinguishable);
         Self {
             verdict: verdict.name(),
-            sentence: sentence(judged, verdict, &causes),
+            sentence: sentence(judged, lines, verdict, &causes),
             baseline: main.as_ref().map_or(nothing, |m| m.baseline.clone()),
             causes,
             rejected: rejected.collect(),
@@ -226,13 +235,14 @@ impl Diagnosis {
                 .iter()
                 .map(|part| (part.analysis.subsystem().name(), SubsystemResult::new(part)))
                 .collect(),
+            lines: lines.iter().map(SpectralLine::sentence).collect(),
             notes,
             wall_s,
         }
     }
 }
 
-fn cause_of(part: &Judged<'_>, cause: &super::verdict::Cause) -> Cause {
+fn cause_of(part: &Judged, cause: &super::verdict::Cause) -> Cause {
     let subsystem = crate::files::effect_id::subsystem_of(cause.id).unwrap_or(part.analysis.subsystem());
     Cause {
         id: cause.id.to_string(),
@@ -244,7 +254,7 @@ fn cause_of(part: &Judged<'_>, cause: &super::verdict::Cause) -> Cause {
 }
 
 /// The verdict on the whole: an unexplained rest anywhere makes it `unknown`, since what is named elsewhere may be its shadow.
-pub fn overall(judged: &[Judged<'_>]) -> Verdict {
+pub fn overall(judged: &[Judged]) -> Verdict {
     let has = |verdict| judged.iter().any(|part| part.verdict == verdict);
     if has(Verdict::Unknown) {
         Verdict::Unknown
@@ -256,11 +266,7 @@ pub fn overall(judged: &[Judged<'_>]) -> Verdict {
 }
 
 /// The subsystem that the figures are about: that of the first cause, of the largest rest, or the first one.
-pub fn main_part<'a, 'b>(
-    judged: &'a [Judged<'b>],
-    verdict: Verdict,
-    causes: &[Cause],
-) -> Option<&'a Judged<'b>> {
+pub fn main_part<'a>(judged: &'a [Judged], verdict: Verdict, causes: &[Cause]) -> Option<&'a Judged> {
     let found = match verdict {
         Verdict::Named => {
             let first = causes.first()?;
@@ -275,7 +281,7 @@ pub fn main_part<'a, 'b>(
     found.or(judged.first())
 }
 
-fn sentence(judged: &[Judged<'_>], verdict: Verdict, causes: &[Cause]) -> String {
+fn sentence(judged: &[Judged], lines: &[SpectralLine], verdict: Verdict, causes: &[Cause]) -> String {
     let percent = |x: Option<f64>| x.map_or("?".to_string(), |x| format!("{:.2} %", 100.0 * x));
     let main = main_part(judged, verdict, causes).map(SubsystemResult::new);
     let Some(main) = main else { return "Nothing could be analysed.".into() };
@@ -297,7 +303,7 @@ fn sentence(judged: &[Judged<'_>], verdict: Verdict, causes: &[Cause]) -> String
             )
         }
         Verdict::Unknown => {
-            let mut along: Vec<String> = Vec::new();
+            let mut along: Vec<String> = lines.iter().map(SpectralLine::sentence).collect();
             for part in judged.iter().filter(|part| part.verdict == Verdict::Unknown) {
                 let views: Vec<String> = telling_views(part)
                     .map(|(channel, v)| format!("{} ({:.0} % of {channel})", v.name, 100.0 * v.share))

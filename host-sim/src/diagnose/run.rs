@@ -8,10 +8,13 @@ use super::coordinates::Coordinates;
 use super::drive::DriveAnalysis;
 use super::pressure::PressureAnalysis;
 use super::selection::select;
-use super::verdict::{Judged, judge};
+use super::verdict::{Judged, Verdict, judge};
+use crate::files::effect_id::{Subsystem, subsystem_of};
 use crate::files::log::{Cells, Log, LogKind};
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
+use crate::files::signal::Signal;
+use crate::fit::drive::record::interpolate;
 use crate::input_error::InputError;
 
 /// Part of a log that is held out where no log is.
@@ -72,16 +75,46 @@ impl Case {
     }
 
     /// Fits, compares and judges; subsystems that cannot be fitted become notes.
-    pub fn judge(&self, told: &(dyn Fn(&str) + Sync)) -> (Vec<Judged<'_>>, Vec<String>) {
+    pub fn judge(&self, told: &(dyn Fn(&str) + Sync)) -> (Vec<Judged>, Vec<String>) {
         let coordinates: Vec<Coordinates> = self.logs.iter().map(|(log, _)| Coordinates::new(log)).collect();
-        let (mut judged, mut notes) = (Vec::new(), self.notes.clone());
+        let (mut judged, mut notes): (Vec<Judged>, Vec<String>) = (Vec::new(), self.notes.clone());
         for analysis in &self.analyses {
+            let mut analysis = analysis.clone();
+            if analysis.subsystem() == Subsystem::Drive
+                && let Some(corrected) = judged.first().and_then(|contact| self.drive_behind(contact))
+            {
+                notes.push(
+                    "drive: the friction torque was corrected for what the friction channel adds".into(),
+                );
+                analysis = corrected;
+            }
             match select(analysis.as_ref(), told) {
-                Ok(selection) => judged.push(judge(analysis.as_ref(), selection, &coordinates)),
+                Ok(selection) => judged.push(judge(analysis, selection, &coordinates)),
                 Err(why) => notes.push(format!("{}: not analysed: {why}", analysis.subsystem().name())),
             }
         }
         (judged, notes)
+    }
+
+    /// The drive under the friction torque itself, where the channel that measures it is known to be wrong.
+    fn drive_behind(&self, contact: &Judged) -> Option<Arc<dyn Analysis>> {
+        let analysis = self.contact.as_ref()?;
+        let measured = |cause: &&'static str| subsystem_of(cause) == Some(Subsystem::Measurement);
+        if contact.verdict != Verdict::Named || !contact.selection.chosen.iter().any(|c| measured(&c)) {
+            return None;
+        }
+        let excess = analysis.shown_in_excess(contact.result()?).ok()?;
+        let mut logs = self.logs.clone();
+        for ((log, _), (time_s, excess)) in logs.iter_mut().zip(&excess) {
+            let start_s = log.time_s().first().copied().unwrap_or(0.0);
+            let times: Vec<f64> = log.time_s().iter().map(|t| t - start_s).collect();
+            let excess = interpolate(time_s, excess, &times);
+            let shown = log.signal(Signal::FrictionTorque)?;
+            let torque = shown.iter().zip(&excess).map(|(shown, excess)| shown - excess).collect();
+            log.set_signal(Signal::FrictionTorque, torque);
+        }
+        let logs: Vec<(&Log, Role)> = logs.iter().map(|(log, role)| (log, *role)).collect();
+        DriveAnalysis::new(&logs).ok().map(|drive| Arc::new(drive) as Arc<dyn Analysis>)
     }
 
     fn analyse(&mut self, kind: LogKind, rig: &RigFile, model: &ModelFile) -> Result<(), InputError> {

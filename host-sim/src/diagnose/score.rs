@@ -44,14 +44,14 @@ pub struct Score {
     pub likelihood: f64,
     /// The same less the price of parameters and effects.
     pub penalised: f64,
-    /// Largest relative fall of a channel's mean square: 1 − after/before.
+    /// Relative fall of the mean square of the subsystem's own signal, its first channel: 1 − after/before.
     pub share: f64,
 }
 
-/// Log-likelihood ratio of `fit` to `base` on the logs of a role, and the largest relative fall of a channel.
+/// Log-likelihood ratio of `fit` to `base` on the logs of a role, and the relative fall of the first channel.
 pub fn likelihood_ratio(base: &Fit, fit: &Fit, role: Role, independent: &Independent) -> (f64, f64) {
-    let (mut likelihood, mut share) = (0.0, 0.0_f64);
-    for before in &channels(base, role) {
+    let (mut likelihood, mut share) = (0.0, 0.0);
+    for (index, before) in channels(base, role).iter().enumerate() {
         let after = channels(fit, role).into_iter().find(|c| c.name == before.name);
         let Some(after) = after else { continue };
         let (from, to, count) = common_losses(before, &after);
@@ -61,7 +61,9 @@ pub fn likelihood_ratio(base: &Fit, fit: &Fit, role: Role, independent: &Indepen
         // Residuals below a millionth of their start are not told apart: rounding.
         let ratio = (to / from).max(1e-6);
         likelihood -= 0.5 * independent.of_channel(before.name) * ratio.ln();
-        share = share.max(1.0 - ratio);
+        if index == 0 {
+            share = 1.0 - ratio;
+        }
     }
     (likelihood, share)
 }

@@ -22,9 +22,11 @@ const MOST_EFFECTS: usize = 3;
 const THREADS: usize = 2;
 /// A rival that scores within this share of the best one's likelihood gain goes into the beam.
 const BEAM_SHARE: f64 = 0.7;
-/// An effect must lower the mean square of some channel by this much: below, it is significant only
+/// An effect must lower the mean square of the subsystem's own signal by this much: below, it is significant only
 /// because there are many samples.
 const MATERIAL_SHARE: f64 = 0.05;
+/// The same, of the baseline's mean square: what is less may be what the laws of the other effects get wrong.
+const IMPERFECT_SHARE: f64 = 0.01;
 /// Estimated gain in log-likelihood below which an effect is not tried beside others.
 const LEAST_ESTIMATE: f64 = 3.0;
 /// Effects tried beside others, those with the largest estimates.
@@ -129,7 +131,7 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
         search.fit_again(std::slice::from_ref(&set), &set);
         let rated = |set: &Combination| score(&base, &search.fits[set], &independent);
         let (before, top) = (rated(&best), rated(&set));
-        let material = step_share(&search.fits[&best], &search.fits[&set], &independent) > MATERIAL_SHARE;
+        let material = is_material(&base, &search.fits[&best], &search.fits[&set], &independent);
         if top.penalised <= before.penalised || !material {
             break;
         }
@@ -149,9 +151,11 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
     Ok(selection)
 }
 
-/// Largest relative fall of a channel from one fit to the next.
-fn step_share(from: &Fit, to: &Fit, independent: &Independent) -> f64 {
-    likelihood_ratio(from, to, Role::Train, independent).1
+/// Whether what a step gains in the subsystem's own signal is more than imperfection, of the noise or of the effects that are in already.
+fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Independent) -> bool {
+    let fall = |from, to| likelihood_ratio(from, to, Role::Train, independent).1;
+    let of_baseline = fall(base, to) - fall(base, from);
+    fall(from, to) > MATERIAL_SHARE && of_baseline > IMPERFECT_SHARE
 }
 
 impl Search<'_> {
@@ -247,7 +251,7 @@ impl Search<'_> {
             for effect in best.iter().copied() {
                 let Some(less) = self.fits.get(&without(best, effect)) else { continue };
                 let missed = whole.penalised - score(&base, less, independent).penalised;
-                let (trained, share) = likelihood_ratio(less, &full, Role::Train, independent);
+                let (trained, _) = likelihood_ratio(less, &full, Role::Train, independent);
                 let (held, _) = likelihood_ratio(less, &full, Role::Holdout, &held_out);
                 let per_value = trained / independent.total().max(1.0);
                 let has_holdout = held_out.total() > 0.0;
@@ -255,7 +259,7 @@ impl Search<'_> {
                 let harms = less.nrmse(Role::Holdout).zip(full.nrmse(Role::Holdout));
                 let harms = harms.is_some_and(|(less, full)| full > HARM * less);
                 let confirmed = !has_holdout || (seen && !harms);
-                let wanted = missed > 0.0 && share > MATERIAL_SHARE;
+                let wanted = missed > 0.0 && is_material(&base, less, &full, independent);
                 if !(wanted && confirmed) && weakest.is_none_or(|(least, ..)| missed < least) {
                     weakest = Some((missed, effect, wanted));
                 }

@@ -19,7 +19,9 @@ const BINS: usize = 20;
 /// Standard deviations.
 const LEVEL: f64 = 5.0;
 /// Structured variance that is tolerated, in units of the noise's variance.
-pub const TOLERATED_VARIANCE: f64 = 0.25;
+pub const TOLERATED_VARIANCE: f64 = 0.4;
+/// Mean square that a noise level estimated too low may give.
+const TOLERATED_LEVEL: f64 = 2.0;
 /// Structured error that is tolerated, relative to the signal's RMS.
 pub const TOLERATED_NRMSE: f64 = 1e-3;
 
@@ -60,7 +62,8 @@ pub struct Structure {
 impl Structure {
     /// Whether it is more than noise and imperfection.
     pub fn is_material(&self) -> bool {
-        let significant = self.deviations > LEVEL
+        let significant = self.mean_square > 2.0 * TOLERATED_LEVEL
+            || self.deviations > LEVEL
             || self.views.iter().any(|view| view.deviations > LEVEL && view.share > 0.02);
         significant && self.structured > TOLERATED_VARIANCE && self.nrmse > TOLERATED_NRMSE
     }
@@ -81,7 +84,8 @@ fn structure(fit: &Fit, channel: &Pooled<'_>, coordinates: &[Coordinates]) -> St
     views.sort_by(|a, b| b.share.total_cmp(&a.share));
     let seen =
         views.iter().filter(|v| v.deviations > LEVEL).map(|v| v.share * mean_square).fold(0.0, f64::max);
-    let structured = lagged.max(seen);
+    // A residual that swings from sample to sample has no mean correlation; its size gives it away.
+    let structured = lagged.max(seen).max(mean_square - TOLERATED_LEVEL);
     Structure {
         channel: channel.name,
         mean_square,

@@ -8,6 +8,8 @@
 //! Probabilities: each chosen effect against each rival in its place and against nothing in its place, by the
 //! differences of the penalised scores, which count independent values as the chosen fit leaves them.
 
+use std::sync::Arc;
+
 use super::analysis::{Analysis, Fit, Role};
 use super::coordinates::Coordinates;
 use super::score::likelihood_ratio;
@@ -70,9 +72,9 @@ pub struct Rejected {
 }
 
 /// All that is known about a subsystem.
-pub struct Judged<'a> {
+pub struct Judged {
     /// The subsystem's analysis.
-    pub analysis: &'a dyn Analysis,
+    pub analysis: Arc<dyn Analysis>,
     /// Its fits.
     pub selection: Selection,
     /// What is said.
@@ -89,7 +91,7 @@ pub struct Judged<'a> {
     pub after: Vec<Structure>,
 }
 
-impl Judged<'_> {
+impl Judged {
     /// The fit that the results stand for: extended where causes are named, else the baseline.
     pub fn result(&self) -> Option<&Fit> {
         match self.verdict {
@@ -98,27 +100,23 @@ impl Judged<'_> {
         }
     }
 
-    /// The largest structured part of the baseline's residual, in variances of the noise.
+    /// The structured part of the baseline's residual of the subsystem's own signal, in variances of the noise.
     pub fn structured_before(&self) -> f64 {
-        self.before.iter().map(|s| s.structured).fold(0.0, f64::max)
+        self.before.first().map_or(0.0, |s| s.structured)
     }
 }
 
 /// Judges a subsystem.
-pub fn judge<'a>(
-    analysis: &'a dyn Analysis,
-    selection: Selection,
-    coordinates: &[Coordinates],
-) -> Judged<'a> {
+pub fn judge(analysis: Arc<dyn Analysis>, selection: Selection, coordinates: &[Coordinates]) -> Judged {
     let tested = |fit: Option<&Fit>| fit.map_or(Vec::new(), |fit| structures(fit, Role::Train, coordinates));
     let before = tested(selection.baseline());
     let after = if selection.chosen.is_empty() { before.clone() } else { tested(selection.extended()) };
-    // In variances of each channel's noise: a rest in a witness counts against what was wrong anywhere.
-    let start = before.iter().map(|b| b.structured).fold(0.0, f64::max);
-    let left = after.iter().any(|after| {
-        after.is_material() && (selection.chosen.is_empty() || after.structured > LEFT_SHARE * start)
+    // Only the subsystem's own signal: other witnesses may carry what is another subsystem's.
+    let left = before.iter().zip(&after).take(1).any(|(before, after)| {
+        after.is_material()
+            && (selection.chosen.is_empty() || after.structured > LEFT_SHARE * before.structured)
     });
-    let wrong = before.iter().any(Structure::is_material);
+    let wrong = before.iter().take(1).any(Structure::is_material);
     let verdict = match (wrong, left, selection.chosen.is_empty()) {
         // What is significant and yet below any real model's imperfection is not worth a name.
         (false, ..) | (true, false, true) => Verdict::None,
@@ -140,7 +138,7 @@ pub fn judge<'a>(
     judged
 }
 
-impl Judged<'_> {
+impl Judged {
     fn name_causes(&mut self) {
         if self.verdict != Verdict::Named {
             return;

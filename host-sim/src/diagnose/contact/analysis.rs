@@ -16,7 +16,7 @@ use super::problem::{Combination, Fitted, Problem};
 use crate::diagnose::analysis::{Analysis, Fit, Role};
 use crate::diagnose::effects;
 use crate::diagnose::record::Record;
-use crate::files::effect_id::Subsystem;
+use crate::files::effect_id::{Subsystem, subsystem_of};
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
@@ -57,6 +57,23 @@ impl ContactAnalysis {
     pub fn to_model_file(&self, fit: &Fit) -> Result<ModelFile, InputError> {
         let fitted = self.fitted(&fit.effects, None).map_err(InputError::new)?;
         output::model_file(&self.problem, &fitted, fit, &self.source)
+    }
+
+    /// What the measurement effects of a fit add to the friction torque that the channel shows, for each
+    /// log (training first) at the times of its record: to be taken off by who needs the torque itself.
+    pub fn shown_in_excess(&self, fit: &Fit) -> Result<Vec<(Vec<f64>, Vec<f64>)>, String> {
+        let fitted = self.fitted(&fit.effects, None)?;
+        let excess = |log: usize| {
+            let mut model = self.problem.model_with(&fitted, log, self.problem.origin(&fitted, log));
+            let shown = self.problem.run_samples(&model, log)?.shown_nm;
+            let of_contact = |id| subsystem_of(id) != Some(Subsystem::Measurement);
+            model.effects.retain(|(extension, _)| of_contact(extension.id()));
+            let plain = self.problem.run_samples(&model, log)?.shown_nm;
+            let excess = shown.iter().zip(&plain).map(|(a, b)| a - b).collect();
+            Ok((self.problem.records[log].time_s.clone(), excess))
+        };
+        let all: Result<Vec<_>, InputError> = (0..self.problem.records.len()).map(excess).collect();
+        all.map_err(|e| e.to_string())
     }
 
     fn known(&self, effects: &[&'static str]) -> Option<Arc<Fitted>> {
