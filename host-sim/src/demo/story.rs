@@ -50,7 +50,7 @@ impl Story {
         let only = |logs: Vec<(&str, Log)>| logs.into_iter().map(|(_, log)| log).collect::<Vec<_>>();
         let case = Case::new(only(train), only(holdout), &rig, &baseline)?;
         let (judged, notes) = case.judge(&|_| ());
-        let diagnosis = Diagnosis::new(&judged, notes, String::new(), 0.0);
+        let diagnosis = Diagnosis::new(&judged, &[], notes, String::new(), 0.0);
         let lead = format!(
             "The logs of Figs. 18–21 (1 kHz; Fig. 19 held out) are given to rig diagnose with a LuGre model. {}",
             diagnosis.sentence

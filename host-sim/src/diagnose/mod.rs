@@ -25,6 +25,7 @@ pub mod score;
 pub mod screening;
 pub mod search;
 pub mod selection;
+pub mod shadows;
 pub mod smooth;
 pub mod structure;
 pub mod verdict;

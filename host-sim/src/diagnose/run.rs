@@ -8,6 +8,7 @@ use super::coordinates::Coordinates;
 use super::drive::DriveAnalysis;
 use super::pressure::PressureAnalysis;
 use super::selection::select;
+use super::shadows::settle;
 use super::verdict::{Judged, Verdict, judge};
 use crate::files::effect_id::{Subsystem, subsystem_of};
 use crate::files::log::{Cells, Log, LogKind};
@@ -93,6 +94,7 @@ impl Case {
                 Err(why) => notes.push(format!("{}: not analysed: {why}", analysis.subsystem().name())),
             }
         }
+        notes.extend(settle(&mut judged, self.contact.as_deref()));
         (judged, notes)
     }
 

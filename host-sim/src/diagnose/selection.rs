@@ -89,6 +89,11 @@ pub fn without(effects: &[&'static str], effect: &str) -> Combination {
     effects.iter().copied().filter(|id| *id != effect).collect()
 }
 
+/// Play sits in a soft shaft: one name holds both.
+fn exclude_each_other(a: &str, b: &str) -> bool {
+    matches!((a, b), ("shaft_torsion", "backlash") | ("backlash", "shaft_torsion"))
+}
+
 struct Search<'a> {
     analysis: &'a dyn Analysis,
     told: &'a (dyn Fn(&str) + Sync),
@@ -170,6 +175,7 @@ impl Search<'_> {
         let mut rated: Vec<(f64, &'static str)> = candidates
             .iter()
             .filter(|id| !set.contains(id) && !self.failed.contains_key(&vec![**id]))
+            .filter(|id| !set.iter().any(|known| exclude_each_other(known, id)))
             .map(|id| {
                 let alone = self.fits.get(&vec![*id]).filter(|_| !set.is_empty());
                 let gain = alone.and_then(|alone| estimated_gain(fit, alone, id, independent));
