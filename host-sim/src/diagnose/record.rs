@@ -109,7 +109,9 @@ impl Record {
         let measured = |values: &[f64], reference: Option<&[f64]>| {
             let clipping = saturation::scan(values, reference);
             let values = averaged(values, group);
-            let noise_std = noise::standard_deviation(&values);
+            // A clipped stretch has no noise.
+            let open: Vec<f64> = values.iter().copied().filter(|x| !clipping.holds(*x)).collect();
+            let noise_std = noise::standard_deviation(&open);
             Measured { values, noise_std, clipping }
         };
         let channel = |signal: Signal, reference: Option<Signal>| {

@@ -21,6 +21,9 @@ const DIFFERENCE: f64 = 1e-3;
 /// Relative fall of the loss below which the search ends.
 const TOLERANCE: f64 = 1e-4;
 
+/// Relative fall of the loss above which derivatives of an earlier point go on being used.
+const BRISK: f64 = 0.02;
+
 /// ρ(r) of one residual; masked ones (NaN) count nothing.
 #[inline]
 pub fn loss(residual: f64) -> f64 {
@@ -147,8 +150,10 @@ pub fn refine(mut point: Point, parameters: &[Parameter], residuals: &Residuals<
                 _ => damping = (damping * 10.0).max(1e-3),
             }
         }
-        let small = before - point.loss < TOLERANCE * before.max(1.0);
-        if improved && !small {
+        let fall = before - point.loss;
+        let small = fall < TOLERANCE * before.max(1.0);
+        // Old derivatives are used for as long as they lead on briskly.
+        if improved && fall > BRISK * before {
             fresh = false;
             continue;
         }

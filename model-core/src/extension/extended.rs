@@ -299,7 +299,7 @@ mod tests {
             (Extension::WearDrift, &[0.1, 100.0]),
             (Extension::LoadDependence, &[0.1, 50.0, 0.0]),
             (Extension::StaticAgeing, &[0.1, 1e-3, 1e-3, 0.0]),
-            (Extension::DirectionAsymmetry, &[0.1, 0.05, 0.5]),
+            (Extension::DirectionAsymmetry, &[0.1, 0.05, 0.5, 0.5]),
             (Extension::BellCurve, &[0.5, 0.2, 1.0, 1.0, 5.0]),
             (Extension::ViscousFilm, &[10.0]),
             (

@@ -42,11 +42,16 @@ const RING_PHASE: f64 = 0.7;
 const LEVEL: f64 = 0.006;
 /// Relative uncertainty of the load.
 const LOAD_GAIN: f64 = 0.01;
+/// Friction coefficient that no rest explains, over the largest known one.
+const OVERLOAD: f64 = 1.05;
+/// Motion that is rest, m, within a time, s.
+const REST_M: f64 = 2e-5;
+const REST_S: f64 = 0.01;
 /// Number of noisy runs that measure what the inputs' noise does.
 const NOISY_RUNS: u64 = 3;
 /// Renewals of the derivatives in the search from one start, and of the best of them.
-const FIRST_ROUNDS: usize = 1;
-const ROUNDS: usize = 6;
+const FIRST_ROUNDS: usize = 2;
+const ROUNDS: usize = 14;
 
 /// A free parameter and what it belongs to.
 #[derive(Debug, Clone, PartialEq)]
@@ -307,9 +312,10 @@ impl Problem {
         let own = record.friction_nm.noise_std.max(1e-9);
         let stuck = self.stuck(model, log);
         let (_, load) = record.inputs(None);
+        let overloaded = self.overloaded(model, log, &load);
         let sigma = self.bins[log].iter().enumerate().map(|(i, bin)| {
             let samples = bin.from..bin.to;
-            let tells = samples.clone().all(|k| !stuck[k]);
+            let tells = samples.clone().all(|k| !stuck[k] && !overloaded[k]);
             if !tells || spread[i].sqrt() > BLIND * own {
                 return f64::NAN;
             }
@@ -321,6 +327,27 @@ impl Problem {
             (own * own / bin.len() as f64 + spread[i] + timing + level).sqrt()
         });
         Ok(sigma.collect())
+    }
+
+    /// Where the disc rests and the element holds more than its load can carry by any friction seen in this
+    /// log: the load was taken off, and what makes it slip at last is too small to be measured.
+    fn overloaded(&self, model: &ContactModel, log: usize, load_n: &[f64]) -> Vec<bool> {
+        let record = &self.records[log];
+        let radius_m = self.rig.friction_radius_m;
+        let still_m = REST_M + 6.0 * radius_m * record.angle_noise_rad;
+        let half = (REST_S / record.step_s).ceil() as usize;
+        let (_, most_friction) = model.stiffness_and_friction();
+        let carried = OVERLOAD * most_friction.max(self.scales.most_friction);
+        let shown = around(&record.friction_nm.values, half / 4, |w| w.iter().sum::<f64>() / w.len() as f64);
+        (0..record.len())
+            .map(|i| {
+                let window = &record.angle_rad[i.saturating_sub(half)..(i + half + 1).min(record.len())];
+                let low = window.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = window.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let rests = radius_m * (high - low) < still_m;
+                rests && shown[i].abs() > carried * radius_m * load_n[i].max(1.0)
+            })
+            .collect()
     }
 
     /// Where stiff bristles stick: the last few milliseconds' motion is a matter of micrometres, and a
@@ -772,6 +799,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
         power_w: 0.0,
         load_n: 1.0,
         friction: 0.0,
+        most_friction: 0.0,
         torque_nm: 1e-3,
         speed_m_s: (0.01, 1.0),
         step_s: records.iter().map(|r| r.step_s).fold(0.0, f64::max),
@@ -817,6 +845,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
         let rank = ((values.len().max(1) - 1) as f64 * share) as usize;
         if values.is_empty() { None } else { Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1) }
     };
+    scales.most_friction = quantile(&mut coefficients, 0.98).unwrap_or(0.0);
     scales.friction = quantile(&mut coefficients, 0.5).unwrap_or(0.0);
     scales.load_n = quantile(&mut loads, 0.5).unwrap_or(1.0);
     if let (Some(low), Some(high)) = (quantile(&mut speeds, 0.05), quantile(&mut speeds, 0.95)) {

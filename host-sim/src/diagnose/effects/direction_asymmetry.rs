@@ -21,12 +21,13 @@ impl ContactEffect for DirectionAsymmetry {
             Parameter::linear("asymmetry_slow", 0.0, -0.9, 0.9),
             Parameter::linear("asymmetry_fast", 0.0, -0.9, 0.9),
             Parameter::logarithmic("between_m_s", (low * high).sqrt(), 0.1 * low, 3.0 * high),
+            Parameter::logarithmic("sharpness", 0.7, 0.25, 2.5),
         ]
     }
 
     fn starts(&self, _variant: usize, scales: &Scales) -> Vec<Start> {
         let (low, high) = scales.speed_m_s;
-        vec![Start::shape(&[0.0, 0.0, (low * high).sqrt()], &[0, 1])]
+        vec![Start::shape(&[0.0, 0.0, (low * high).sqrt(), 0.7], &[0, 1])]
     }
 
     fn apply(

@@ -37,6 +37,8 @@ pub struct Scales {
     pub load_n: f64,
     /// Median friction coefficient while sliding.
     pub friction: f64,
+    /// Largest but for 2 %.
+    pub most_friction: f64,
     /// Friction torque, RMS, N·m.
     pub torque_nm: f64,
     /// Low and high end of the sliding speeds (5 % and 95 % of the sliding samples), m/s.
