@@ -9,9 +9,16 @@ use std::sync::Arc;
 
 use super::conditioned::DriveLog;
 use super::effect::{DriveEffect, Known, Prepared, Regressor, Seen, Slow};
+use super::resonance::Resonance;
 use super::shaft::{Shaft, Spring, add_motor_share, disc_per_inertia, typical_acceleration};
 use super::units::Units;
 use crate::fit::bounds::Parameter;
+use crate::fit::drive::inverse::Motion;
+
+/// Widest gap of a shaft's coupling.
+const WIDEST_RAD: f64 = 0.1;
+/// Widest gap of a stage.
+const WIDEST_M: f64 = 2e-3;
 
 /// The effect.
 pub struct Backlash;
@@ -30,6 +37,12 @@ impl Prepared for DeadZone {
 
     fn starts(&self) -> &[Vec<f64>] {
         &self.starts
+    }
+
+    fn resonance(&self, shape: &[f64]) -> Option<Resonance> {
+        // Of the flank at the typical torque.
+        let slope = shape[2] * self.typical / shape[1];
+        Some(Resonance { omega_rad_s: slope.sqrt(), damping_ratio: shape[3] })
     }
 
     fn regressors(&self, shape: &[f64], seen: &Seen<'_>) -> Vec<Regressor> {
@@ -63,7 +76,9 @@ impl DriveEffect for Backlash {
         let Some(log) = logs.first() else { return Err("no training log".into()) };
         let band = log.band_hz;
         let travel = log.position.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>();
-        let (low, high) = (4.0 * log.position_std.max(1e-12), 0.02 * travel);
+        let widest = if log.motion == Motion::Rotary { WIDEST_RAD } else { WIDEST_M };
+        let high = widest.min(0.02 * travel);
+        let low = (20.0 * log.position_std).max(high / 300.0);
         if high <= 4.0 * low {
             return Err("the drive hardly moves".into());
         }
@@ -78,15 +93,13 @@ impl DriveEffect for Backlash {
             Parameter::logarithmic("damping_ratio", 0.1, 1e-2, 1.5),
             Parameter::linear("disc_friction_share", 0.3, 0.0, 3.0),
         ];
-        let (gaps, depths) = (9, 7);
+        let (gaps, depths) = (8, 6);
         let mut starts = Vec::new();
         for g in 0..gaps {
             let gap = low * (high / low).powf((f64::from(g) + 0.5) / f64::from(gaps));
             for d in 0..depths {
                 let depth = shallow * (deep / shallow).powf((f64::from(d) + 0.5) / f64::from(depths));
-                for exponent in [1.1, 1.6] {
-                    starts.push(vec![gap, depth, exponent, 0.1, 0.3]);
-                }
+                starts.push(vec![gap, depth, 1.2, 0.1, 0.3]);
             }
         }
         add_motor_share(logs, &mut shapes, &mut starts);

@@ -38,6 +38,8 @@ pub struct ContactChannels {
     pub friction: Vec<f64>,
     /// Normal force.
     pub normal: Vec<f64>,
+    /// Standard deviation of the friction's white noise.
+    pub friction_std: f64,
 }
 
 /// A conditioned log.
@@ -83,7 +85,11 @@ impl DriveLog {
             let (friction, normal) = (contact.friction_torque_nm, contact.normal_force_n);
             let grid = Grid::over(signals.time_s).ok_or_else(short)?;
             let even = |values: &[f64]| grid.resample(signals.time_s, values);
-            Some(ContactChannels { friction: even(friction), normal: even(normal) })
+            {
+                let friction = even(friction);
+                let friction_std = noise::white_std(&friction);
+                Some(ContactChannels { friction, normal: even(normal), friction_std })
+            }
         } else {
             None
         };
@@ -117,6 +123,7 @@ impl DriveLog {
         let contact = contact.map(|contact| ContactChannels {
             friction: filter.zero_phase(&contact.friction),
             normal: filter.zero_phase(&contact.normal),
+            friction_std: contact.friction_std,
         });
         // Derivative of white noise behind a low-pass: σ 2π f_c √(2 f_c/(3 rate)).
         let omega = 2.0 * std::f64::consts::PI * cutoff_hz;

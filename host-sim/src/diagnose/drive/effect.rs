@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use super::conditioned::DriveLog;
+use super::resonance::Resonance;
 use crate::fit::bounds::Parameter;
 
 /// Inertia and friction in slow motion.
@@ -68,6 +69,11 @@ pub trait Prepared: Send + Sync {
 
     /// Delay of motion behind effort, s.
     fn delay_s(&self, _shape: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// A resonance that the measured friction passes on its way to the motor.
+    fn resonance(&self, _shape: &[f64]) -> Option<Resonance> {
         None
     }
 

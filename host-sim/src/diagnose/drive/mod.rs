@@ -20,6 +20,7 @@ pub mod model;
 pub mod noise;
 pub mod output;
 pub mod presliding;
+pub mod resonance;
 pub mod shaft;
 pub mod shaft_torsion;
 pub mod slow;

@@ -18,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::conditioned::DriveLog;
 use super::effect::{Prepared, Regressor, Seen};
+use super::resonance::{Resonance, noise_ratio};
 use super::whitening::Whitener;
 use crate::fit::drive::inverse::Motion;
 use crate::fit::drive::record::central_difference;
@@ -219,7 +220,24 @@ impl Model<'_> {
         }
         columns.extend(filtered.friction_timing.clone());
         columns.extend(filtered.friction_ring.clone());
-        Whitened { effort, columns }
+        let mut whitened = Whitened { effort, columns };
+        if let Some((resonance, ratio)) = self.resonance(shapes).zip(noise_ratio(log)) {
+            let step_s = log.record.step_s * filtered.whitener.factor() as f64;
+            let filters = resonance.filters(ratio, step_s, log.band_hz);
+            // What is wrong with the friction channel reaches the motor through the disc.
+            let friction = whitened.columns.len() - 2;
+            for column in &mut whitened.columns[friction..] {
+                *column = filters.through_disc(column);
+            }
+            whitened.effort = filters.whiten(&whitened.effort);
+            whitened.columns.iter_mut().for_each(|column| *column = filters.whiten(column));
+        }
+        whitened
+    }
+
+    /// The resonance that a part puts between the friction and the motor.
+    pub fn resonance(&self, shapes: &Shapes) -> Option<Resonance> {
+        (0..self.parts.len()).find_map(|i| self.parts[i].prepared.resonance(self.shapes_of(i, shapes)))
     }
 
     /// Sizes that fit `problems` best; timing is kept within its limits. `None` if nothing is left of

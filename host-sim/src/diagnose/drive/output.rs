@@ -209,7 +209,16 @@ fn noise_std(model: &Model<'_>, solved: &Solved, index: usize) -> f64 {
     let log = &model.logs[index].log;
     let rate_hz = log.record.rate_hz();
     let limit_hz = (0.5 * super::conditioned::REPORT_HZ).min(0.5 * rate_hz);
-    let force = log.force_std.powi(2) * 2.0 * limit_hz / rate_hz;
+    let mut force = log.force_std.powi(2) * 2.0 * limit_hz / rate_hz;
+    if let (Some(resonance), Some(contact)) = (model.resonance(&solved.shapes), &log.contact) {
+        // The friction's noise reaches the motor through the disc.
+        let steps = 2000;
+        let mean = (0..steps)
+            .map(|i| resonance.gain_squared((f64::from(i) + 0.5) / f64::from(steps) * limit_hz))
+            .sum::<f64>()
+            / f64::from(steps);
+        force += (mean - 1.0) * contact.friction_std.powi(2) * 2.0 * limit_hz / rate_hz;
+    }
     // ∫ (2πf)⁴ df over the band.
     let omega = 2.0 * std::f64::consts::PI;
     let curved = omega.powi(4) * limit_hz.powi(5) / 5.0 * 2.0 / rate_hz;

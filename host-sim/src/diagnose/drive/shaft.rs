@@ -56,7 +56,24 @@ pub struct Shaft {
 /// Steps are at most this share of 1/ω.
 const STEP_SHARE: f64 = 0.25;
 
+/// Most steps in a sample; a stiffer flank is taken for the stiffest that they resolve.
+const MOST_STEPS: f64 = 10.0;
+
 impl Spring {
+    /// The strain at which it pulls with `torque` (over the disc's inertia).
+    fn strain_of(&self, torque: f64) -> f64 {
+        match *self {
+            Self::Shaft { stiffness, .. } => torque / stiffness,
+            Self::Flanks { half_gap, factor, exponent, .. } => {
+                if torque == 0.0 {
+                    0.0
+                } else {
+                    (half_gap + (torque.abs() / factor).powf(1.0 / exponent)).copysign(torque)
+                }
+            }
+        }
+    }
+
     fn pull(&self, strain: f64) -> f64 {
         match *self {
             Self::Shaft { stiffness, hardening } => {
@@ -86,22 +103,25 @@ impl Shaft {
     pub fn torque_per_inertia(&self, log: &DriveLog) -> Vec<f64> {
         let step_s = log.record.step_s;
         let rate = self.spring.steepest().sqrt().max(self.damping);
-        let splits = (rate * step_s / STEP_SHARE).ceil().clamp(1.0, 100.0);
+        let splits = (rate * step_s / STEP_SHARE).ceil().clamp(1.0, MOST_STEPS);
         let h = step_s / splits;
         let gap = self.spring.has_gap();
         let (Some(&first), Some(&speed)) = (log.position.first(), log.speed.first()) else {
             return Vec::new();
         };
         let rubbing = log.contact.as_ref().map(|contact| contact.friction.as_slice());
-        let (mut x, mut v) = (first, speed);
+        // Settled under the friction at the first sample.
+        let load = rubbing.map_or(0.0, |friction| self.per_inertia * friction[0]);
+        let (mut x, mut v) = (first - self.spring.strain_of(load), speed);
         let mut torque = vec![0.0; log.len()];
         for (i, torque) in torque.iter_mut().enumerate().skip(1) {
             let (p0, p1) = (log.position[i - 1], log.position[i]);
             let (s0, s1) = (log.speed[i - 1], log.speed[i]);
             // Cubic through both ends' positions and speeds.
             let (a, b) = (step_s * s0 - (p1 - p0), (p1 - p0) - step_s * s1);
-            let load =
-                rubbing.map_or(0.0, |friction| self.per_inertia * 0.5 * (friction[i - 1] + friction[i]));
+            let (load0, load1) = rubbing.map_or((0.0, 0.0), |friction| {
+                (self.per_inertia * friction[i - 1], self.per_inertia * friction[i])
+            });
             let mut w = 0.0;
             for k in 1..=splits as usize {
                 let t = k as f64 / splits;
@@ -113,6 +133,8 @@ impl Shaft {
                     w = 0.0;
                 }
                 // Coulomb friction cannot turn the disc around within a step.
+                // Leapfrog: motor, pull and load belong to the end of the step, speed to its middle.
+                let load = load0 + t * (load1 - load0);
                 let free = v + h * (w - load - self.viscous * v);
                 let stop = h * self.coulomb;
                 v = if free.abs() <= stop { 0.0 } else { free - stop.copysign(free) };

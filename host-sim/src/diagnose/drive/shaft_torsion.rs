@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::conditioned::DriveLog;
 use super::effect::{DriveEffect, Known, Prepared, Regressor, Seen};
+use super::resonance::Resonance;
 use super::shaft::{Shaft, Spring, add_motor_share, disc_per_inertia, typical_acceleration};
 use super::units::Units;
 use crate::fit::bounds::Parameter;
@@ -32,6 +33,11 @@ impl Prepared for TwoMasses {
 
     fn starts(&self) -> &[Vec<f64>] {
         &self.starts
+    }
+
+    fn resonance(&self, shape: &[f64]) -> Option<Resonance> {
+        let omega_rad_s = 2.0 * std::f64::consts::PI * shape[0];
+        Some(Resonance { omega_rad_s, damping_ratio: shape[1] })
     }
 
     fn regressors(&self, shape: &[f64], seen: &Seen<'_>) -> Vec<Regressor> {

@@ -9,6 +9,9 @@ use crate::fit::least_squares::{Options, search};
 /// Starts that are taken from a grid into the search.
 const STARTS: usize = 2;
 
+/// A second start is searched from where its sum of squares is within this factor of the best one's.
+const OTHER_START: f64 = 1.5;
+
 /// A fitted model.
 #[derive(Clone)]
 pub struct Solved {
@@ -87,8 +90,9 @@ pub fn solve(model: &Model<'_>, start: Shapes, grids: &[(usize, Vec<Vec<f64>>)])
             let sizes = model.solve(&problems, &names)?;
             Some(residuals(&problems, &sizes))
         };
-        let options = Options { patience: 25, tolerance: 1e-5, ..Options::default() };
-        for (_, start) in &starts {
+        let options = Options { patience: 8, tolerance: 1e-5, one_sided: true, ..Options::default() };
+        let promising = OTHER_START * starts[0].0;
+        for (_, start) in starts.iter().filter(|(cost, _)| *cost <= promising) {
             for (parameter, value) in parameters.iter_mut().zip(&start.values) {
                 parameter.start = value.clamp(parameter.low, parameter.high);
             }

@@ -90,6 +90,11 @@ impl Whitener {
             .collect()
     }
 
+    /// Input samples per output.
+    pub fn factor(&self) -> usize {
+        self.factor
+    }
+
     /// Half the filter's length in input samples.
     pub fn half_length(&self) -> usize {
         self.taps.len() / 2
