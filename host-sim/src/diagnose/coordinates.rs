@@ -14,7 +14,7 @@ const COOLING_S: f64 = 5.0;
 /// How long a breakaway is fresh.
 const FRESH_S: f64 = 0.15;
 /// A shorter rest is noise around zero speed.
-const LEAST_REST_S: f64 = 0.02;
+const LEAST_REST_S: f64 = 0.05;
 /// Samples a second are enough for what a residual is sorted by.
 const RATE_HZ: f64 = 500.0;
 /// Share of the typical speed below which a drive rests.

@@ -24,13 +24,24 @@ fn with_contact(judged: &[Judged], contact: &ContactAnalysis) -> Result<String, 
     let friction = judged.iter().find(|part| part.analysis.subsystem() == Subsystem::Friction);
     let Some(fit) = friction.and_then(Judged::result) else { return Ok(drive(judged)) };
     let mut extended = contact.to_model_file(fit)?;
+    let mut others = Vec::new();
     for part in judged.iter().filter(|part| part.analysis.subsystem() != Subsystem::Friction) {
         let Some(fit) = part.result() else { continue };
-        extended.extensions.extend(part.causes.iter().map(|cause| extension(fit, cause.id)));
+        others.extend(part.causes.iter().map(|cause| extension(fit, cause.id)));
     }
-    let text = extended.to_toml();
-    ModelFile::parse("model-extended.toml", &text)?;
-    Ok(text)
+    let mut remarks = String::new();
+    for other in others {
+        extended.extensions.push(other);
+        if let Err(why) = ModelFile::parse("model-extended.toml", &extended.to_toml()) {
+            // Found with other parameters than those that the observer on the chip takes: told, not run.
+            let Some(other) = extended.extensions.pop() else { continue };
+            remarks += &format!("\n# {} was found beside the friction model ({why}):\n", other.id);
+            for (name, value) in &other.parameters {
+                remarks += &format!("# {}", line(name, *value));
+            }
+        }
+    }
+    Ok(extended.to_toml() + &remarks)
 }
 
 fn extension(fit: &Fit, id: &str) -> Extension {

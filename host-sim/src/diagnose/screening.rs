@@ -55,6 +55,9 @@ pub fn estimated_gain(fit: &Fit, alone: &Fit, effect: &str, independent: &Indepe
 
 /// Sum of squares of a vector that columns explain.
 fn projected(columns: &DMatrix<f64>, vector: &DVector<f64>) -> f64 {
+    if columns.is_empty() {
+        return 0.0;
+    }
     let mut scaled = columns.clone();
     for mut column in scaled.column_iter_mut() {
         let norm = column.norm();

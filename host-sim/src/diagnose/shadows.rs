@@ -24,6 +24,9 @@ const LIKE_A_SHAFT: [&str; 6] = [
     "load_dependence",
 ];
 
+/// Effects of the drive that a load of which the timing is not quite right looks like.
+const LIKE_A_LATE_LOAD: [&str; 4] = ["presliding", "shaft_torsion", "backlash", "bearing_stribeck"];
+
 /// Names clipped channels and silences what stands in another fault's shadow; gives a note for each.
 pub fn settle(judged: &mut [Judged], contact: Option<&ContactAnalysis>) -> Vec<String> {
     if let Some(contact) = contact {
@@ -41,6 +44,10 @@ pub fn settle(judged: &mut [Judged], contact: Option<&ContactAnalysis>) -> Vec<S
             (Subsystem::Friction, "encoder_eccentricity") => only(&["disc_angle"]),
             (Subsystem::Friction, "shaft_torsion" | "backlash") => only(&LIKE_A_SHAFT),
             (Subsystem::Pressure, "bridge_drift" | "adc_saturation") => true,
+            // A load that comes at the wrong moment is wrong where it changes: at reversals and steps.
+            (Subsystem::Drive, "friction_delay" | "ring_resonance") => {
+                part.verdict == Verdict::Unknown || only(&LIKE_A_LATE_LOAD)
+            }
             (Subsystem::Drive, id) => {
                 part.verdict == Verdict::Unknown && subsystem_of(id) == Some(Subsystem::Measurement)
             }
