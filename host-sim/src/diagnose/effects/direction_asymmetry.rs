@@ -27,7 +27,9 @@ impl ContactEffect for DirectionAsymmetry {
 
     fn starts(&self, _variant: usize, scales: &Scales) -> Vec<Start> {
         let (low, high) = scales.speed_m_s;
-        vec![Start::shape(&[0.0, 0.0, (low * high).sqrt(), 0.7], &[0, 1])]
+        [((low * high).sqrt(), 0.5), ((low * high).sqrt(), 1.2), (high, 0.6), (high, 1.2)]
+            .map(|(between_m_s, sharpness)| Start::shape(&[0.0, 0.0, between_m_s, sharpness], &[0, 1]))
+            .to_vec()
     }
 
     fn apply(
