@@ -22,6 +22,9 @@ use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 
+/// Times and values.
+pub type Series = (Vec<f64>, Vec<f64>);
+
 /// The contact's analysis of a set of logs.
 pub struct ContactAnalysis {
     problem: Problem,
@@ -61,7 +64,7 @@ impl ContactAnalysis {
 
     /// What the measurement effects of a fit add to the friction torque that the channel shows, for each
     /// log (training first) at the times of its record: to be taken off by who needs the torque itself.
-    pub fn shown_in_excess(&self, fit: &Fit) -> Result<Vec<(Vec<f64>, Vec<f64>)>, String> {
+    pub fn shown_in_excess(&self, fit: &Fit) -> Result<Vec<Series>, String> {
         let fitted = self.fitted(&fit.effects, None)?;
         let excess = |log: usize| {
             let mut model = self.problem.model_with(&fitted, log, self.problem.origin(&fitted, log));
