@@ -108,6 +108,9 @@ impl DriveAnalysis {
     }
 
     fn extend(&self, from: Option<&Solved>, effects: &[&'static str]) -> Result<Solved, String> {
+        if ["shaft_torsion", "backlash"].iter().all(|id| effects.contains(id)) {
+            return Err("a gap has the shaft's spring in it: the two are not added up".into());
+        }
         let mut parts: Vec<Part> = Vec::new();
         let mut shapes = Shapes { values: Vec::new(), origins: vec![0.0; self.logs.len()] };
         let mut grids = Vec::new();
