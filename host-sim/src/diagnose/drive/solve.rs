@@ -90,8 +90,11 @@ pub fn solve(model: &Model<'_>, start: Shapes, grids: &[(usize, Vec<Vec<f64>>)])
             let sizes = model.solve(&problems, &names)?;
             Some(residuals(&problems, &sizes))
         };
-        let options = Options { patience: 8, tolerance: 1e-5, one_sided: true, ..Options::default() };
-        let promising = OTHER_START * starts[0].0;
+        // One or two shapes are cheap: searched to the end, from each start.
+        let few = parameters.len() <= 2;
+        let patience = if few { 25 } else { 8 };
+        let options = Options { patience, tolerance: 1e-5, one_sided: !few, ..Options::default() };
+        let promising = if few { f64::INFINITY } else { OTHER_START * starts[0].0 };
         for (_, start) in starts.iter().filter(|(cost, _)| *cost <= promising) {
             for (parameter, value) in parameters.iter_mut().zip(&start.values) {
                 parameter.start = value.clamp(parameter.low, parameter.high);
