@@ -100,7 +100,8 @@ fn firmware(run: &mut Runner, root: &Path) {
 }
 
 fn bench(run: &mut Runner) {
-    let lints = [&["clippy", "--quiet", "--release", "--all-targets"][..], &BENCH, &["--", "-D", "warnings"]];
+    // In the profile of the host's lints, whose work it shares.
+    let lints = [&["clippy", "--quiet", "--all-targets"][..], &BENCH, &["--", "-D", "warnings"]];
     run.cargo("bench lints", ".", &lints.concat());
     // Its tables are what a reader of the log wants to see.
     run.cargo("bench suite", ".", &[&["test", "--release"][..], &BENCH, &["--", "--nocapture"]].concat());
