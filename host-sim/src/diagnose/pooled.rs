@@ -132,13 +132,13 @@ pub fn common_losses(a: &Pooled<'_>, b: &Pooled<'_>) -> (f64, f64, usize) {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(super) mod tests {
     use super::super::analysis::LogFit;
     use super::super::noise::tests::white;
     use super::*;
 
     /// A fit with one training log of one channel.
-    pub fn fit_of(residual: Vec<f64>) -> Fit {
+    pub(in super::super) fn fit_of(residual: Vec<f64>) -> Fit {
         let time_s: Vec<f64> = (0..residual.len()).map(|i| i as f64 * 0.01).collect();
         let count = residual.len();
         let channel = Channel {

@@ -177,7 +177,7 @@ impl SubsystemResult {
 }
 
 /// The views that say most about what is left.
-pub fn telling_views<'a>(judged: &'a Judged) -> impl Iterator<Item = (&'static str, &'a View)> {
+pub fn telling_views(judged: &Judged) -> impl Iterator<Item = (&'static str, &View)> {
     judged.after.iter().take(1).filter(|s| s.is_material()).flat_map(|s| {
         let telling = s.views.iter().filter(|v| v.deviations > 2.0 && v.share > 0.05);
         telling.take(MOST_VIEWS).map(|v| (s.channel, v))
@@ -213,7 +213,7 @@ impl Diagnosis {
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let causes: Vec<Cause> = ranked.into_iter().map(|(_, cause)| cause).collect();
         let main = main_part(judged, verdict, &causes);
-        let main = main.map(|part| SubsystemResult::new(part));
+        let main = main.map(SubsystemResult::new);
         let nothing = Baseline { kind: String::new(), train_nrmse: None, holdout_nrmse: None };
         let no_gain = Extended { holdout_nrmse: None, gain: None, noise_floor_nrmse: None };
         let rejected = judged.iter().flat_map(|part| &part.rejected).map(|r| Rejected {

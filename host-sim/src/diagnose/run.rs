@@ -102,7 +102,7 @@ impl Case {
     fn drive_behind(&self, contact: &Judged) -> Option<Arc<dyn Analysis>> {
         let analysis = self.contact.as_ref()?;
         let measured = |cause: &&'static str| subsystem_of(cause) == Some(Subsystem::Measurement);
-        if contact.verdict != Verdict::Named || !contact.selection.chosen.iter().any(|c| measured(&c)) {
+        if contact.verdict != Verdict::Named || !contact.selection.chosen.iter().any(measured) {
             return None;
         }
         let excess = analysis.shown_in_excess(contact.result()?).ok()?;
