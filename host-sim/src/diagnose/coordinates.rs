@@ -2,8 +2,8 @@
 //!
 //! From the log alone, without a model: speed is the slope of the smoothed position; sliding distance,
 //! dissipated energy (of the measured friction or effort) and heat (the same, forgotten with a time constant of
-//! [`COOLING_S`]) start at zero in each log; dwell is the rest before the last breakaway and counts for
-//! [`FRESH_S`] of motion. Quantities of which a log knows nothing are left out.
+//! `COOLING_S`) start at zero in each log; dwell is the rest before the last breakaway and counts for
+//! `FRESH_S` of motion. Quantities of which a log knows nothing are left out.
 
 use super::smooth;
 use crate::files::log::{Log, LogKind};

@@ -1,9 +1,9 @@
 //! Lines in the spectrum of a channel that stand at one frequency all the time: hum, a supply's ripple, a fan.
 //!
 //! What the rig does itself changes with its motion and load. A frequency at which a channel has power in every stretch of every log is none
-//! of its effects. The spectrum of stretches of [`STRETCH_S`] (Hann window, straight line taken off) is compared
-//! with that of its neighbours: the lower quartile over all stretches must stand out by [`FACTOR`].
-//! Left out: lines below [`LOWEST_HZ`], where motion has power all the time, and those that come and go.
+//! of its effects. The spectrum of stretches of `STRETCH_S` (Hann window, straight line taken off) is compared
+//! with that of its neighbours: the lower quartile over all stretches must stand out by `FACTOR`.
+//! Left out: lines below `LOWEST_HZ`, where motion has power all the time, and those that come and go.
 
 use std::f64::consts::TAU;
 

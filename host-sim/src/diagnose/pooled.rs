@@ -112,7 +112,7 @@ impl Pooled<'_> {
 
 /// Mean losses of a channel in two fits, over the samples that count in both, and their number.
 ///
-/// The loss is Student's with [`FREEDOM`] degrees of freedom, in units of the lower of the two levels (not below noise):
+/// The loss is Student's with `FREEDOM` degrees of freedom, in units of the lower of the two levels (not below noise):
 /// nearly the square, but a few outliers, a breakaway a moment too late, do not decide.
 pub fn common_losses(a: &Pooled<'_>, b: &Pooled<'_>) -> (f64, f64, usize) {
     let pairs = || {

@@ -1,6 +1,6 @@
 //! Which effects, of all that a subsystem's library has, the logs ask for.
 //!
-//! Stepwise: each round adds each candidate to each of the best combinations so far ([`BEAM`] of them, so
+//! Stepwise: each round adds each candidate to each of the best combinations so far (`BEAM` of them, so
 //! that a strong rival cannot hide a pair), fits, and scores on the training logs ([`super::score`]). A
 //! round counts if its best gains more than its price and is material. Then every effect is taken out once
 //! again; one that is not missed goes. What is left must also lower the error on the held-out logs, which

@@ -6,9 +6,9 @@
 //! [`super::coordinates`]; in each bin its mean, and its part along the direction of friction (times load) are taken off.
 //! What that explains beyond what chance would, with so many bins and values so little independent, is the view's share.
 //!
-//! A test is significant beyond [`LEVEL`] standard deviations: there are some tens of tests for each log, and a false alarm is
-//! worse than a miss. No real model is perfect; what is significant and yet below [`TOLERATED_VARIANCE`] of the noise's variance, or
-//! below [`TOLERATED_NRMSE`] of the signal, counts as noise.
+//! A test is significant beyond `LEVEL` standard deviations: there are some tens of tests for each log, and a false alarm is
+//! worse than a miss. No real model is perfect; what is significant and yet below `TOLERATED_VARIANCE` of the noise's variance, or
+//! below `TOLERATED_NRMSE` of the signal, counts as noise.
 
 use super::analysis::{Fit, Role};
 use super::coordinates::{Coordinates, quantile};

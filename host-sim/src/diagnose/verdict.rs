@@ -2,7 +2,7 @@
 //!
 //! `none`: no effect earns its price and the baseline's residual is noise, or so little that no real model
 //! would do better. `named`: the chosen effects explain the structured part of the residual. `unknown`: it is structured and nothing
-//! explains it, or what is left after the best explanation is still more than [`LEFT_SHARE`] of it: then a nearest name would
+//! explains it, or what is left after the best explanation is still more than `LEFT_SHARE` of it: then a nearest name would
 //! be a wrong one.
 //!
 //! Probabilities: each chosen effect against each rival in its place and against nothing in its place, by the

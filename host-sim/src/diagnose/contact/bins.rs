@@ -1,4 +1,4 @@
-//! A record cut into bins: single samples where something happens, up to [`MOST_SAMPLES`] together where
+//! A record cut into bins: single samples where something happens, up to `MOST_SAMPLES` together where
 //! nothing does.
 //!
 //! A mean over samples that lie on a straight line loses nothing of what a model could be told by them, so

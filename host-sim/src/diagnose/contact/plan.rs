@@ -2,7 +2,7 @@
 //!
 //! A bin of several samples is one step: bristles are advanced exactly for a held speed, and a wound-up
 //! block hardly moves. After a change of speed or load the block of a series element winds up over a few
-//! milliseconds and millimetres; there a sample is cut into pieces of [`FINE_S`]. Between samples speed and
+//! milliseconds and millimetres; there a sample is cut into pieces of `FINE_S`. Between samples speed and
 //! load follow the cubic with the slopes of the neighbours. A step has the mean speed over it and the load
 //! at its end, where its result belongs. Pieces are even in number, so that one ends in the bin's middle,
 //! where a single sample was taken.

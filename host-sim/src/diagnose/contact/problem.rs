@@ -5,7 +5,7 @@
 //! the residual is divided by √(σ_T² + σ_in² + σ_t²): the channel's noise, what the inputs' noise does to
 //! the prediction (measured by running the fitted baseline with the noise put on once more), and a fifth of
 //! a sample's change of the torque (the log does not say at which instant within a sample a channel was
-//! read). Where the inputs' noise would move the prediction by more than [`BLIND`] σ_T the sample is masked:
+//! read). Where the inputs' noise would move the prediction by more than `BLIND` σ_T the sample is masked:
 //! stuck on stiff bristles, the force depends on motion below the encoder's resolution.
 
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! Frequencies at which a friction channel may ring: peaks in the spectrum of what the baseline leaves.
 //!
-//! Mean periodogram of Hann windows of [`WINDOW_S`], on a logarithmic grid of frequencies, times the square of
+//! Mean periodogram of Hann windows of `WINDOW_S`, on a logarithmic grid of frequencies, times the square of
 //! the frequency (what jumps leave falls with it). Only where a search starts; nothing is concluded.
 
 use std::f64::consts::TAU;

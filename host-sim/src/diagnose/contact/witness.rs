@@ -3,7 +3,7 @@
 //! τ2 = J ω̇ + τ_bearing(ω) + T, all as means over [`BLOCK_S`]. What the friction channel shows beyond the
 //! true torque (drift, crosstalk, delay) is missing in τ2; what changes friction itself is in both. So
 //!
-//! y = τ2 − T_shown + (T_shown − T)_model = J ω̇ + b₊[ω>0] + b₋[ω<0] + c₊ω[ω>0] + c₋ω[ω<0]
+//! y = τ2 − T_shown + (T_shown − T)_model = J ω̇ + b₊\[ω>0\] + b₋\[ω<0\] + c₊ω\[ω>0\] + c₋ω\[ω<0\]
 //!
 //! must hold with one set of coefficients for all logs, found by linear least squares inside the residual.
 //! They are free per direction so that an asymmetric bearing or an offset of M2 does not speak against the

@@ -2,7 +2,7 @@
 //!
 //! Source: cogging and mutual torque of permanent-magnet motors; gears and screws between motor and
 //! lever. F = P[G τ − F0 − Σ_n A_n cos(n w (x − x₀)) + B_n sin(n w (x − x₀))], n = 1 to 3, x the travel,
-//! w any wave number with at least [`FEWEST_WAVES`] waves in the travel; x₀ is one origin per log.
+//! w any wave number with at least `FEWEST_WAVES` waves in the travel; x₀ is one origin per log.
 //! w is looked for where a wave, with the gain and preload free, explains most of the residual.
 //! Sets it apart: several ups and downs of the force over torque, the same on the way up and down.
 
