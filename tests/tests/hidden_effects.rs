@@ -47,7 +47,11 @@ fn drive(effects: &[Effect], seed: u64) -> Scenario {
 #[test]
 fn the_papers_own_discovery_is_made_again() {
     let effects = [Effect::ElementCompliance];
-    is_named(&Scenario { plan: Plan::Paper, base: Base::Lugre, ..Scenario::new(&effects, 18) });
+    // Seeds whose element slides steadily at 10 rpm. Where the block's damping is below F_N |g'| it sticks and
+    // slips by itself there, no prediction keeps its phase for seconds, and the answer is `unknown`.
+    for seed in [2, 3] {
+        is_named(&Scenario { plan: Plan::Paper, base: Base::Lugre, ..Scenario::new(&effects, seed) });
+    }
 }
 
 #[test]
