@@ -46,7 +46,8 @@ fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_
 
     let html = made.page.to_html();
     assert_eq!(made.story.diagnosis.verdict, "named", "{}", made.story.diagnosis.sentence);
-    assert_eq!(made.story.diagnosis.causes[0].id, "element_compliance");
+    let causes: Vec<&str> = made.story.diagnosis.causes.iter().map(|cause| cause.id.as_str()).collect();
+    assert_eq!(causes, ["element_compliance"]);
     assert!(made.story.diagnosis.extended.gain.unwrap() > 0.4, "{}", made.story.found());
     assert!(html.contains("What a model without the block gets wrong"));
     for name in ["Fig. 18", "Fig. 21", "Fig. 22", "Fig. 23", "Fig. 26", "Fig. 27", "Five models at 120 rpm"] {

@@ -802,6 +802,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
         most_friction: 0.0,
         torque_nm: 1e-3,
         speed_m_s: (0.01, 1.0),
+        rarer_direction: 0.0,
         step_s: records.iter().map(|r| r.step_s).fold(0.0, f64::max),
         friction_ends_nm: (None, None),
         normal_clips: false,
@@ -815,6 +816,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
     };
     let (mut speeds, mut loads, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
     let (mut squares, mut work_j, mut sliding_s, mut count) = (0.0, 0.0, 0.0, 0usize);
+    let mut backward_s = 0.0;
     for record in records {
         let (low, high) = &mut scales.friction_ends_nm;
         let own = record.friction_nm.clipping;
@@ -836,6 +838,7 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
                 coefficients.push(torque.abs() / radius_m / load[i]);
                 work_j += (torque * speed[i]).abs() * record.step_s;
                 sliding_s += record.step_s;
+                backward_s += if v < 0.0 { record.step_s } else { 0.0 };
             }
         }
         scales.distance_m = scales.distance_m.max(distance_m);
@@ -852,6 +855,9 @@ fn scales(rig: &RigFile, baseline: &ContactModel, records: &[Record]) -> Scales 
         scales.speed_m_s = (low, high.max(2.0 * low));
     }
     scales.torque_nm = (squares / count.max(1) as f64).sqrt().max(1e-6);
+    if sliding_s > 0.0 {
+        scales.rarer_direction = f64::min(backward_s, sliding_s - backward_s) / sliding_s;
+    }
     scales.power_w = if sliding_s > 0.0 { (work_j / sliding_s).max(1e-6) } else { 1.0 };
     scales.distance_m = scales.distance_m.max(1e-3);
     scales.duration_s = scales.duration_s.max(1e-3);

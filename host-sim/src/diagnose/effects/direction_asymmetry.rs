@@ -8,6 +8,10 @@ use model_core::extension::Extension;
 
 use super::{ContactEffect, ContactModel, Parameter, Scales, Start};
 
+/// Share of the sliding time that each direction needs: with one direction alone there is nothing to compare,
+/// and the law would only bend the Stribeck curve.
+const LEAST_SHARE: f64 = 0.03;
+
 pub(super) struct DirectionAsymmetry;
 
 impl ContactEffect for DirectionAsymmetry {
@@ -41,5 +45,9 @@ impl ContactEffect for DirectionAsymmetry {
         model: &mut ContactModel,
     ) {
         model.set(Extension::DirectionAsymmetry, values.to_vec());
+    }
+
+    fn applies(&self, _model: &ContactModel, scales: &Scales) -> bool {
+        scales.rarer_direction > LEAST_SHARE
     }
 }

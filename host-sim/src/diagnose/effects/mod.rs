@@ -43,6 +43,8 @@ pub struct Scales {
     pub torque_nm: f64,
     /// Low and high end of the sliding speeds (5 % and 95 % of the sliding samples), m/s.
     pub speed_m_s: (f64, f64),
+    /// Share of the sliding time that goes in the rarer direction.
+    pub rarer_direction: f64,
     /// Sampling step, s.
     pub step_s: f64,
     /// Lowest and highest value of the friction channel where it clips, N·m.
