@@ -3,10 +3,12 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
+
 use crate::effect::Effect;
 
 /// Friction model behind the log where no effect changes it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Base {
     /// LuGre or series element, by the seed.
     #[default]
@@ -20,7 +22,7 @@ pub enum Base {
 }
 
 /// What is logged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Form {
     /// Elements on the disc, every column.
     #[default]
@@ -32,7 +34,7 @@ pub enum Form {
 }
 
 /// Which motions and loads are run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Plan {
     /// A shuffled deck of dwells, slides, ramps, sines, reversals, load changes and torque parts.
     #[default]

@@ -10,6 +10,19 @@ pub fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
+/// What is wrong with the arguments, without usage and hints, in one line.
+pub fn wrong_argument(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let said: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let said = said.join(" ");
+    said.strip_prefix("error: ").unwrap_or(&said).to_string()
+}
+
 /// `--set`
 #[derive(clap::Args, Debug, Default)]
 pub struct SetArgs {

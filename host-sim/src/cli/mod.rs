@@ -103,15 +103,7 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
         let _ = error.print();
         return ExitCode::from(BAD_INPUT);
     }
-    let text = error.to_string();
-    let said: Vec<&str> = text
-        .lines()
-        .map(str::trim)
-        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
-        .filter(|line| !line.is_empty())
-        .collect();
-    let said = said.join(" ");
-    eprintln!("rig: {}; see rig --help", said.strip_prefix("error: ").unwrap_or(&said));
+    eprintln!("rig: {}; see rig --help", common::wrong_argument(error));
     ExitCode::from(BAD_INPUT)
 }
 

@@ -28,4 +28,5 @@ pub mod selection;
 pub mod shadows;
 pub mod smooth;
 pub mod structure;
+pub mod uncertainty;
 pub mod verdict;

@@ -7,7 +7,7 @@ use crate::error::BenchError;
 use crate::experiment::{self, Done, ObserverResidual, Request};
 use crate::firmware_build;
 use clap::{ArgGroup, Parser};
-use host_sim::cli::common::{SetArgs, say};
+use host_sim::cli::common::{SetArgs, say, wrong_argument};
 use host_sim::cli::progress::Progress;
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
@@ -108,15 +108,7 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
-    let text = error.to_string();
-    let said: Vec<&str> = text
-        .lines()
-        .map(str::trim)
-        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
-        .filter(|line| !line.is_empty())
-        .collect();
-    let said = said.join(" ");
-    eprintln!("virtual-bench: {}; see --help", said.strip_prefix("error: ").unwrap_or(&said));
+    eprintln!("virtual-bench: {}; see --help", wrong_argument(error));
     ExitCode::from(BAD_INPUT)
 }
 

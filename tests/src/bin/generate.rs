@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use rig_tests::{Base, Effect, Form, Plan, Scenario, generate};
 
 #[derive(Parser)]
@@ -23,14 +23,14 @@ struct Arguments {
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
     /// Friction model behind the logs
-    #[arg(long, value_enum, default_value_t = BaseName::BySeed)]
-    base: BaseName,
+    #[arg(long, value_enum, default_value_t = Base::BySeed)]
+    base: Base,
     /// What is logged
-    #[arg(long, value_enum, default_value_t = FormName::Contact)]
-    form: FormName,
+    #[arg(long, value_enum, default_value_t = Form::Contact)]
+    form: Form,
     /// Which motions are run
-    #[arg(long, value_enum, default_value_t = PlanName::Random)]
-    plan: PlanName,
+    #[arg(long, value_enum, default_value_t = Plan::Random)]
+    plan: Plan,
     /// Length of each log
     #[arg(long, default_value_t = 20.0)]
     duration_s: f64,
@@ -43,27 +43,6 @@ struct Arguments {
     /// Folder to write to
     #[arg(long)]
     out: PathBuf,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum BaseName {
-    BySeed,
-    Lugre,
-    Series,
-    ModifiedLugre,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum FormName {
-    Contact,
-    Drive,
-    LinearStage,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum PlanName {
-    Random,
-    Paper,
 }
 
 fn main() -> ExitCode {
@@ -88,21 +67,9 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let scenario = Scenario {
         rate_hz: arguments.rate_hz,
         noise_factor: arguments.noise,
-        base: match arguments.base {
-            BaseName::BySeed => Base::BySeed,
-            BaseName::Lugre => Base::Lugre,
-            BaseName::Series => Base::Series,
-            BaseName::ModifiedLugre => Base::ModifiedLugre,
-        },
-        form: match arguments.form {
-            FormName::Contact => Form::Contact,
-            FormName::Drive => Form::Drive,
-            FormName::LinearStage => Form::LinearStage,
-        },
-        plan: match arguments.plan {
-            PlanName::Random => Plan::Random,
-            PlanName::Paper => Plan::Paper,
-        },
+        base: arguments.base,
+        form: arguments.form,
+        plan: arguments.plan,
         duration_s: arguments.duration_s,
         rig_file_error: arguments.rig_file_error,
         temperature_sensor: arguments.temperature,

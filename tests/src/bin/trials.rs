@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use rig_tests::trial::{Answer, Confusion};
 use rig_tests::{Base, Effect, Form, Scenario, generate};
 
@@ -48,28 +48,14 @@ struct Arguments {
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
     /// What is logged
-    #[arg(long, value_enum, default_value_t = FormName::Contact)]
-    form: FormName,
+    #[arg(long, value_enum, default_value_t = Form::Contact)]
+    form: Form,
     /// Friction model behind the logs
-    #[arg(long, value_enum, default_value_t = BaseName::BySeed)]
-    base: BaseName,
+    #[arg(long, value_enum, default_value_t = Base::BySeed)]
+    base: Base,
     /// Keep the cases and the results in this folder
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum FormName {
-    Contact,
-    Drive,
-    LinearStage,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum BaseName {
-    BySeed,
-    Lugre,
-    Series,
 }
 
 fn main() -> ExitCode {
@@ -137,8 +123,7 @@ fn cases(arguments: &Arguments) -> Result<Vec<(Vec<Effect>, u64)>, String> {
         && arguments.pairs.is_none()
         && !arguments.outside
         && arguments.none.is_none();
-    let fits =
-        |effect: &Effect| matches!(arguments.form, FormName::Contact) || effect.works_without_contact();
+    let fits = |effect: &Effect| matches!(arguments.form, Form::Contact) || effect.works_without_contact();
     let mut hidden: Vec<Vec<Effect>> = Vec::new();
     if all {
         hidden.extend(Effect::known().into_iter().filter(fits).map(|effect| vec![effect]));
@@ -180,16 +165,8 @@ fn trial(
     let scenario = Scenario {
         rate_hz: arguments.rate_hz,
         noise_factor: arguments.noise,
-        base: match arguments.base {
-            BaseName::BySeed => Base::BySeed,
-            BaseName::Lugre => Base::Lugre,
-            BaseName::Series => Base::Series,
-        },
-        form: match arguments.form {
-            FormName::Contact => Form::Contact,
-            FormName::Drive => Form::Drive,
-            FormName::LinearStage => Form::LinearStage,
-        },
+        base: arguments.base,
+        form: arguments.form,
         ..Scenario::new(effects, seed)
     };
     let case = generate(&scenario).map_err(|e| e.to_string())?;

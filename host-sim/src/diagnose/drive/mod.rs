@@ -38,6 +38,7 @@ use model::{Filtered, Model, Part, Shapes, baseline_names};
 use solve::Solved;
 
 use super::analysis::{Analysis, Fit, Role};
+use super::selection::sorted;
 use crate::files::effect_id::Subsystem;
 use crate::files::log::Log;
 
@@ -169,12 +170,6 @@ impl DriveAnalysis {
         let effects = effects.to_vec();
         Known { slow: slow::fit(&self.train(), &solved.sizes.values), residual, effects }
     }
-}
-
-fn sorted(effects: &[&'static str]) -> Vec<&'static str> {
-    let mut key = effects.to_vec();
-    key.sort_unstable();
-    key
 }
 
 impl Analysis for DriveAnalysis {

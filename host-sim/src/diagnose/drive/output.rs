@@ -1,11 +1,9 @@
 //! A fitted drive in the form that the comparison of causes reads.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::model::{FRICTION_RING, Filtered, Model, Shapes, curvature, delayed, gross, is_timing};
 use super::solve::Solved;
 use crate::diagnose::analysis::{Channel, Estimate, Fit, LogFit, Role};
-use crate::fit::covariance;
+use crate::diagnose::uncertainty::{has_influence, set_std};
 
 /// Step of a difference for the derivative by a shape, of its range.
 const SHAPE_STEP: f64 = 1e-3;
@@ -37,7 +35,11 @@ pub fn fit(logs: &[Filtered], solved: &Solved, effects: &[&'static str]) -> Fit 
     parameters.splice(0..0, linear);
     let channels: Vec<Channel> =
         (0..logs.len()).map(|index| channel(&model, solved, index, &nonlinear)).collect();
-    set_std(&mut parameters, &channels, logs, solved, linear_count);
+    let train = channels.iter().zip(logs).filter(|(_, log)| log.log.role == Role::Train);
+    let train: Vec<&Channel> = train.map(|(channel, _)| channel).collect();
+    let held = |p: usize| p < linear_count && is_timing(&solved.names[p]);
+    let free: Vec<usize> = (0..parameters.len()).filter(|&p| has_influence(&train, p) && !held(p)).collect();
+    set_std(&mut parameters, &train, &free);
     for part in &solved.parts {
         let constant = |(name, value)| Estimate { effect: Some(part.id), name, value, std: 0.0, log: None };
         parameters.extend(part.prepared.constants().into_iter().map(constant));
@@ -118,44 +120,6 @@ fn channel(model: &Model<'_>, solved: &Solved, index: usize, nonlinear: &[Nonlin
 /// Outputs of the filter whose centre does not count.
 fn masked(filtered: &Filtered, positions: &[usize]) -> Vec<bool> {
     positions.iter().map(|&at| filtered.log.weight[at] == 0.0).collect()
-}
-
-fn set_std(
-    parameters: &mut [Estimate],
-    channels: &[Channel],
-    logs: &[Filtered],
-    solved: &Solved,
-    linear_count: usize,
-) {
-    let train: Vec<usize> = (0..logs.len()).filter(|&i| logs[i].log.role == Role::Train).collect();
-    let rows: usize = train.iter().map(|&i| channels[i].residual.len()).sum();
-    let free: Vec<usize> = (0..parameters.len())
-        .filter(|&p| {
-            let held = p < linear_count && is_timing(&solved.names[p]);
-            let known = train.iter().any(|&i| channels[i].sensitivity[p].iter().any(|x| *x != 0.0));
-            known && !held
-        })
-        .collect();
-    let mut jacobian = DMatrix::zeros(rows, free.len());
-    let mut residual = DVector::zeros(rows);
-    let mut row = 0;
-    for &i in &train {
-        let channel = &channels[i];
-        for (k, r) in channel.residual.iter().enumerate() {
-            if r.is_finite() {
-                residual[row] = *r;
-                for (column, &p) in free.iter().enumerate() {
-                    jacobian[(row, column)] = channel.sensitivity[p].get(k).copied().unwrap_or(0.0);
-                }
-            }
-            row += 1;
-        }
-    }
-    if let Some(covariance) = covariance::sandwich(&jacobian, &residual) {
-        for (column, &p) in free.iter().enumerate() {
-            parameters[p].std = covariance[(column, column)].max(0.0).sqrt();
-        }
-    }
 }
 
 /// Measured and predicted effort as the contract compares them: decimated to 100 Hz.

@@ -23,6 +23,7 @@ use model::{Filtered, Model, Part, Shapes};
 use solve::Solved;
 
 use super::analysis::{Analysis, Fit, Role};
+use super::selection::sorted;
 use crate::files::effect_id::Subsystem;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
@@ -118,12 +119,6 @@ impl PressureAnalysis {
         }
         left
     }
-}
-
-fn sorted(effects: &[&'static str]) -> Vec<&'static str> {
-    let mut key = effects.to_vec();
-    key.sort_unstable();
-    key
 }
 
 impl Analysis for PressureAnalysis {

@@ -1,11 +1,9 @@
 //! A fitted press in the form that the comparison of causes reads.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::model::{Filtered, Model};
 use super::solve::{Solved, training};
 use crate::diagnose::analysis::{Channel, Estimate, Fit, LogFit};
-use crate::fit::covariance;
+use crate::diagnose::uncertainty::{has_influence, set_std};
 
 /// Step of a difference for the derivative by a nonlinear value, of its range.
 const STEP: f64 = 1e-3;
@@ -53,7 +51,13 @@ pub fn fit(logs: &[Filtered], solved: &Solved, effects: &[&'static str]) -> Fit 
     }
     let channels: Vec<Channel> =
         (0..logs.len()).map(|index| channel(&model, solved, index, &places)).collect();
-    set_std(&mut parameters, &channels, &training(logs));
+    let train: Vec<&Channel> = training(logs).into_iter().map(|i| &channels[i]).collect();
+    let free: Vec<usize> = (0..parameters.len())
+        .filter(|&p| has_influence(&train, p))
+        // A coefficient on its bound of 0 is not free.
+        .filter(|&p| parameters[p].value != 0.0)
+        .collect();
+    set_std(&mut parameters, &train, &free);
     for part in &solved.parts {
         let constants = part.prepared.constants();
         parameters.extend(
@@ -93,33 +97,6 @@ fn channel(model: &Model<'_>, solved: &Solved, index: usize, places: &[(Place, f
         residual: residual.iter().zip(&positions).map(counted).collect(),
         sensitivity,
         samples_per_noise: log.whitener.samples_per_noise,
-    }
-}
-
-fn set_std(parameters: &mut [Estimate], channels: &[Channel], train: &[usize]) {
-    let free: Vec<usize> = (0..parameters.len())
-        .filter(|&p| train.iter().any(|&i| channels[i].sensitivity[p].iter().any(|x| *x != 0.0)))
-        // A coefficient on its bound of 0 is not free.
-        .filter(|&p| parameters[p].value != 0.0)
-        .collect();
-    let rows: usize = train.iter().map(|&i| channels[i].residual.len()).sum();
-    let (mut jacobian, mut residual) = (DMatrix::zeros(rows, free.len()), DVector::zeros(rows));
-    let mut row = 0;
-    for channel in train.iter().map(|&i| &channels[i]) {
-        for (k, r) in channel.residual.iter().enumerate() {
-            if r.is_finite() {
-                residual[row] = *r;
-                for (column, &p) in free.iter().enumerate() {
-                    jacobian[(row, column)] = channel.sensitivity[p].get(k).copied().unwrap_or(0.0);
-                }
-            }
-            row += 1;
-        }
-    }
-    if let Some(covariance) = covariance::sandwich(&jacobian, &residual) {
-        for (column, &p) in free.iter().enumerate() {
-            parameters[p].std = covariance[(column, column)].max(0.0).sqrt();
-        }
     }
 }
 
