@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use host_sim::design::separation::Reach;
-use host_sim::design::{self, Proposal};
+use host_sim::design::{self, Effort, Proposal};
 use host_sim::diagnose::noise;
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
@@ -50,7 +50,7 @@ fn the_proposed_experiment_settles_what_a_steady_slide_leaves_open() {
     // Both within the same few per cent of each other: the log cannot say which it is.
     assert!(open[1] < 1.1 * open[0], "{open:?}");
 
-    let proposals = design::propose(&rig, &models, |_, _| {}).unwrap();
+    let proposals = design::propose(&rig, &models, Effort::THOROUGH, |_, _| {}).unwrap();
     let best: &Proposal = &proposals[0];
     assert!(best.separation() > 2.0, "{}", best.sentence());
     let settled = errors(&rig, &models, &best.toml);

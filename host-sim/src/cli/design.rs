@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::common::{SetArgs, say};
 use super::progress::Progress;
-use crate::design::{Proposal, propose};
+use crate::design::{Effort, Proposal, propose};
 use crate::files::model_file::ModelFile;
 use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
@@ -79,7 +79,7 @@ impl Design {
         }
         let mut output = OutputDir::new(&self.out)?;
         let progress = Mutex::new(Progress::new("trying experiments", 1));
-        let proposals = propose(&rig, &models, |done, total| {
+        let proposals = propose(&rig, &models, Effort::THOROUGH, |done, total| {
             if let Ok(mut progress) = progress.lock() {
                 progress.of(total as u64);
                 progress.set(done as u64);

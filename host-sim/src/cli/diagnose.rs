@@ -8,7 +8,7 @@ use super::common::{SetArgs, say};
 use super::progress::Progress;
 use crate::diagnose::extended_model;
 use crate::diagnose::lines;
-use crate::diagnose::next_experiment;
+use crate::diagnose::next_experiment::{self, Bench};
 use crate::diagnose::page;
 use crate::diagnose::results::Diagnosis;
 use crate::diagnose::run::Case;
@@ -76,7 +76,14 @@ impl Diagnose {
         if judged.is_empty() {
             return Err(InputError::new(notes.join("; ")).key("--train"));
         }
-        let next = next_experiment::propose(&judged, case.contact.is_some().then_some((&rig, &model)));
+        let bench = case.contact.as_deref().map(|contact| Bench { rig: &rig, model: &model, contact });
+        let progress = Mutex::new(Progress::new("trying experiments", 1));
+        let next = next_experiment::propose(&judged, bench, |done, total| {
+            let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
+            progress.of(total as u64);
+            progress.set(done as u64);
+        });
+        drop(progress);
         if let Some(text) = &next.file {
             output.write(next_experiment::FILE, text)?;
         }

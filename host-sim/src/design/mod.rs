@@ -21,10 +21,6 @@ use crate::predict::ContactInputs;
 use family::{Family, Setting};
 use separation::Reach;
 
-/// Shares of the largest load that are tried.
-const LOADS: [f64; 2] = [0.4, 1.0];
-/// Speeds that are tried, rpm.
-const SPEEDS_RPM: [f64; 3] = [10.0, 40.0, 120.0];
 /// Longest hold, s, and the range within which it is improved.
 const HOLD_S: f64 = 1.0;
 const HOLDS_S: (f64, f64) = (0.25, 2.5);
@@ -32,8 +28,25 @@ const HOLDS_S: (f64, f64) = (0.25, 2.5);
 const SPEED_RANGE_RPM: (f64, f64) = (1.0, 200.0);
 /// Factor by which a level is moved.
 const FACTOR: f64 = 1.6;
-/// Each level is moved so often at most.
-const ROUNDS: usize = 2;
+
+/// How much is tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Shares of the largest load that every family is tried at.
+    loads: &'static [f64],
+    /// Speeds that every family is tried at, rpm.
+    speeds_rpm: &'static [f64],
+    /// Each level of the best is moved so often at most.
+    rounds: usize,
+}
+
+impl Effort {
+    /// About sixty experiments.
+    pub const THOROUGH: Self = Self { loads: &[0.4, 1.0], speeds_rpm: &[10.0, 40.0, 120.0], rounds: 2 };
+    /// About twenty, for a search at the end of other work: at a third of the time, without light loads and slow
+    /// turns but where a level of the best is moved there.
+    pub const QUICK: Self = Self { loads: &[1.0], speeds_rpm: &[40.0, 120.0], rounds: 1 };
+}
 
 /// A pair of models and how far they are apart.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -87,18 +100,19 @@ impl Proposal {
 pub fn propose(
     rig: &RigFile,
     models: &[ModelFile],
+    effort: Effort,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Vec<Proposal>, InputError> {
     let largest_n = text::largest_load_n(rig, models);
     let mut settings = Vec::new();
     for family in Family::ALL {
-        for share in LOADS {
-            for speed_rpm in SPEEDS_RPM {
+        for share in effort.loads {
+            for speed_rpm in effort.speeds_rpm.iter().copied() {
                 settings.push(Setting { family, load_n: share * largest_n, speed_rpm, hold_s: HOLD_S });
             }
         }
     }
-    let moves = 6 * ROUNDS;
+    let moves = 6 * effort.rounds;
     let total = settings.len() + moves;
     let done = std::sync::atomic::AtomicUsize::new(0);
     let tell = |count: usize| {
@@ -116,7 +130,7 @@ pub fn propose(
     let mut proposals: Vec<Proposal> =
         tried.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     sort(&mut proposals);
-    for _ in 0..ROUNDS {
+    for _ in 0..effort.rounds {
         let Some(best) = proposals.first() else { break };
         let better: Vec<Proposal> = neighbours(best.setting, largest_n)
             .into_par_iter()

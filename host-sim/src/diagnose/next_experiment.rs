@@ -1,13 +1,17 @@
 //! What to run next, from what is left open.
 //!
-//! Two causes that the logs do not tell apart ask for the experiment in which they differ, a named cause for the one
-//! that shows it best, a clean log for one that excludes its closest rival. The choice is by the signatures of the causes;
-//! `rig design` looks for the best levels with the models themselves. Drives without contact have no experiment file: there
-//! is no rig whose limits are known.
+//! Two causes of the contact that the logs do not tell apart: both models as fitted are put against each other, and
+//! the experiment on which they differ most is searched for ([`crate::design`], with the smaller effort). Where there
+//! is no such pair, or no model can be run, the choice is by the signatures of the causes: a named cause asks for the
+//! experiment that shows it best, a clean log for one that excludes its closest rival. Drives without contact have no
+//! experiment file: there is no rig whose limits are known.
 
+use super::contact::ContactAnalysis;
+use super::selection::without;
 use super::verdict::{Judged, Verdict};
 use crate::design::family::{Family, Setting};
-use crate::design::text;
+use crate::design::{self, Effort, Proposal, text};
+use crate::files::effect_id::Subsystem;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 
@@ -19,6 +23,19 @@ const LOAD_SHARE: f64 = 0.8;
 const SPEED_RPM: f64 = 60.0;
 /// Holds, s.
 const HOLD_S: f64 = 1.5;
+/// Separation below which a repetition or a longer log is needed to tell two models apart.
+const CLEAR: f64 = 1.0;
+
+/// What is known about the rig where the logs have contact.
+#[derive(Clone, Copy)]
+pub struct Bench<'a> {
+    /// Its limits.
+    pub rig: &'a RigFile,
+    /// The baseline as it was given.
+    pub model: &'a ModelFile,
+    /// The contact's fits.
+    pub contact: &'a ContactAnalysis,
+}
 
 /// A proposal.
 pub struct NextExperiment {
@@ -28,8 +45,16 @@ pub struct NextExperiment {
     pub file: Option<String>,
 }
 
-/// Proposes what to run next; `contact` is the rig and its model where the logs have contact.
-pub fn propose(judged: &[Judged], contact: Option<(&RigFile, &ModelFile)>) -> NextExperiment {
+/// Proposes what to run next; `bench` is there where the logs have contact. `progress` is told the number of
+/// experiments tried, and of all to be tried.
+pub fn propose(
+    judged: &[Judged],
+    bench: Option<Bench<'_>>,
+    progress: impl Fn(usize, usize) + Sync,
+) -> NextExperiment {
+    if let Some(found) = bench.and_then(|bench| tell_apart(judged, bench, progress)) {
+        return found;
+    }
     let pair = judged.iter().flat_map(|part| &part.indistinguishable).next();
     let named = judged.iter().filter(|p| p.verdict == Verdict::Named).flat_map(|p| &p.causes).next();
     let closest = judged.iter().flat_map(|part| &part.rejected).find(|r| r.probability < 0.5);
@@ -42,7 +67,7 @@ pub fn propose(judged: &[Judged], contact: Option<(&RigFile, &ModelFile)>) -> Ne
         _ => ("to look further".into(), None),
     };
     let (motion, family) = experiment(id.unwrap_or(""));
-    let Some((rig, model)) = contact else {
+    let Some(Bench { rig, model, .. }) = bench else {
         return NextExperiment { sentence: format!("{why}: {motion}"), file: None };
     };
     let load_n = LOAD_SHARE * text::largest_load_n(rig, std::slice::from_ref(model));
@@ -51,6 +76,38 @@ pub fn propose(judged: &[Judged], contact: Option<(&RigFile, &ModelFile)>) -> Ne
         sentence: format!("{why}: {motion}; {FILE} holds {}", family.words()),
         file: Some(text::toml("next", &why, &setting.course(), rig)),
     }
+}
+
+/// The experiment on which two causes of the contact differ most that these logs do not tell apart; `None` where
+/// there are none, or no model of them runs on this rig.
+fn tell_apart(
+    judged: &[Judged],
+    bench: Bench<'_>,
+    progress: impl Fn(usize, usize) + Sync,
+) -> Option<NextExperiment> {
+    let part = judged.iter().find(|part| part.analysis.subsystem() == Subsystem::Friction)?;
+    let [named, rival] = part.indistinguishable.first()?.as_slice() else { return None };
+    let chosen = &part.selection.chosen;
+    let instead = [without(chosen, named), vec![*rival]].concat();
+    let models: Vec<ModelFile> = [chosen, &instead]
+        .into_iter()
+        .map(|effects| bench.contact.to_model_file(part.selection.fit(effects)?).ok())
+        .collect::<Option<_>>()?;
+    let best = design::propose(bench.rig, &models, Effort::QUICK, progress).ok()?.into_iter().next()?;
+    let why = format!("to tell {named} and {rival} apart");
+    Some(NextExperiment {
+        sentence: format!("{why}: {}; {FILE} holds it", predicted(&best)),
+        file: Some(text::toml("next", &why, &best.setting.course(), bench.rig)),
+    })
+}
+
+/// The experiment and what it is expected to show.
+fn predicted(best: &Proposal) -> String {
+    let sentence = best.sentence();
+    if best.separation() >= CLEAR {
+        return sentence;
+    }
+    format!("{sentence}, so that even this one, the best of those tried, has to be repeated")
 }
 
 fn experiment(id: &str) -> (&'static str, Family) {
@@ -83,5 +140,136 @@ fn experiment(id: &str) -> (&'static str, Family) {
             ("reversals of growing frequency", Family::Reversals)
         }
         _ => ("the same motion at other loads", Family::LoadStaircase),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+
+    use super::super::analysis::{Analysis, Role};
+    use super::super::score::Independent;
+    use super::super::selection::Selection;
+    use super::super::verdict::judge;
+    use super::*;
+    use crate::files::effect_id::EFFECTS;
+    use crate::files::experiment_file::ExperimentFile;
+    use crate::files::log::Log;
+    use crate::lockstep::{self, Setup};
+
+    const LUGRE: &str = r#"
+kind = "lugre"
+[parameters]
+sigma0_n_per_m = 1e6
+a0 = 0.6
+a1 = 0.3
+v0_m_s = 0.5
+"#;
+    const WEAR: &str = r#"
+[[extension]]
+id = "wear_drift"
+change_per_m = -0.05
+scale_m = 1e3
+"#;
+    /// Heat that never had the time to leave and distance that was slid look alike.
+    const STEADY: &str = r#"
+name = "steady"
+title = "steady slide"
+duration_s = 4.0
+seed = 5
+log_rate_hz = 500
+[[m1]]
+start_s = 0.0
+torque_nm = 2.0
+[[m2]]
+start_s = 0.0
+speed_rpm = 60.0
+"#;
+
+    fn run(experiment: &str, rig: &RigFile, model: &ModelFile) -> Log {
+        let experiment = ExperimentFile::parse(FILE, experiment).unwrap();
+        let setup = Setup::from_files(&experiment, rig, model, model).unwrap();
+        let recording = lockstep::run(&setup, |_, _| {}).unwrap();
+        assert_eq!(recording.fault, None);
+        recording.log(20, setup.plant.counts_per_rev)
+    }
+
+    /// A slide at one speed and load that wears, with the fits of two causes, of which it cannot tell which is true.
+    fn open_case(rig: &RigFile, model: &ModelFile) -> (Arc<ContactAnalysis>, Vec<Judged>) {
+        let worn = ModelFile::parse("worn", &format!("{LUGRE}{WEAR}")).unwrap();
+        let log = run(STEADY, rig, &worn);
+        let contact = Arc::new(ContactAnalysis::new(rig, model, &[(&log, Role::Train)]).unwrap());
+        let mut fits = BTreeMap::new();
+        for effects in [vec![], vec!["thermal_fade"], vec!["wear_drift"]] {
+            let fit = contact.fit(&effects, None).unwrap();
+            fits.insert(effects, Arc::new(fit));
+        }
+        let independent = Independent::of(&fits[&vec!["wear_drift"]], Role::Train);
+        let chosen = vec!["wear_drift"];
+        let selection =
+            Selection { fits, failed: BTreeMap::new(), chosen, unconfirmed: Vec::new(), independent };
+        let mut part = judge(contact.clone(), selection, &[]);
+        part.indistinguishable = vec![vec!["wear_drift", "thermal_fade"]];
+        (contact, vec![part])
+    }
+
+    fn separation(sentence: &str) -> f64 {
+        let (_, after) = sentence.split_once("would miss by ").unwrap();
+        after.split(' ').next().unwrap().parse().unwrap()
+    }
+
+    #[test]
+    fn two_causes_that_are_not_told_apart_get_the_experiment_on_which_their_models_differ() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let model = ModelFile::parse("model", LUGRE).unwrap();
+        let (contact, judged) = open_case(&rig, &model);
+        let bench = Bench { rig: &rig, model: &model, contact: &contact };
+        let told = std::sync::atomic::AtomicUsize::new(0);
+        let started = std::time::Instant::now();
+        let next = propose(&judged, Some(bench), |done, total| {
+            assert!(done <= total);
+            told.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        });
+        println!("{:.1} s: {}", started.elapsed().as_secs_f64(), next.sentence);
+        assert!(
+            next.sentence.starts_with("to tell wear_drift and thermal_fade apart: "),
+            "{}",
+            next.sentence
+        );
+        // Heat goes and wear stays: an experiment that lets it go is far beyond the noise of a sample.
+        assert!(separation(&next.sentence) > 1.0, "{}", next.sentence);
+        assert!(told.into_inner() > 10, "progress is told");
+        let log = run(&next.file.unwrap(), &rig, &model);
+        assert!(log.len() > 1000);
+    }
+
+    #[test]
+    fn a_pair_whose_models_were_not_fitted_falls_back_on_the_family_that_shows_the_rival() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let model = ModelFile::parse("model", LUGRE).unwrap();
+        let (contact, mut judged) = open_case(&rig, &model);
+        judged[0].indistinguishable = vec![vec!["wear_drift", "static_ageing"]];
+        let next = propose(&judged, Some(Bench { rig: &rig, model: &model, contact: &contact }), |_, _| {});
+        assert!(
+            next.sentence.ends_with("next-experiment.toml holds dwells of growing length"),
+            "{}",
+            next.sentence
+        );
+        run(&next.file.unwrap(), &rig, &model);
+    }
+
+    #[test]
+    fn every_effect_has_an_experiment_that_the_core_takes_and_words_of_its_own() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let model = ModelFile::assumed(&[]).unwrap();
+        let load_n = LOAD_SHARE * text::largest_load_n(&rig, &[model]);
+        for (id, _) in EFFECTS {
+            let (motion, family) = experiment(id);
+            let setting = Setting { family, load_n, speed_rpm: SPEED_RPM, hold_s: HOLD_S };
+            let toml = text::toml("next", motion, &setting.course(), &rig);
+            ExperimentFile::parse(FILE, &toml).unwrap().for_core(&rig).unwrap();
+            assert_ne!(motion, experiment("").0, "{id}");
+        }
     }
 }
