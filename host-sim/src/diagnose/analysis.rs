@@ -26,6 +26,11 @@ pub trait Analysis: Sync {
     /// The error is a sentence: why this combination cannot be fitted to these logs.
     fn fit(&self, effects: &[&'static str], near: Option<&Fit>) -> Result<Fit, String>;
 
+    /// Parameters of an effect that are read off the training logs instead of being fitted: names with units, values.
+    fn constants(&self, _effect: &str) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+
     /// What sets this effect apart from its rivals, as seen in a fit that has it: sentences with numbers.
     fn evidence(&self, effect: &'static str, fit: &Fit) -> Vec<String>;
 }

@@ -244,11 +244,14 @@ impl Diagnosis {
 
 fn cause_of(part: &Judged, cause: &super::verdict::Cause) -> Cause {
     let subsystem = crate::files::effect_id::subsystem_of(cause.id).unwrap_or(part.analysis.subsystem());
+    let mut parameters = part.result().map_or(BTreeMap::new(), |fit| parameters(fit, Some(cause.id)));
+    let read_off = part.analysis.constants(cause.id).into_iter();
+    parameters.extend(read_off.map(|(name, value)| (name.to_string(), Parameter { value, std: None })));
     Cause {
         id: cause.id.to_string(),
         subsystem: subsystem.name(),
         probability: cause.probability,
-        parameters: part.result().map_or(BTreeMap::new(), |fit| parameters(fit, Some(cause.id))),
+        parameters,
         evidence: cause.evidence.clone(),
     }
 }

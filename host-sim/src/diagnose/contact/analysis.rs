@@ -154,6 +154,10 @@ impl Analysis for ContactAnalysis {
         output::fit(&self.problem, &fitted, effects)
     }
 
+    fn constants(&self, effect: &str) -> Vec<(&'static str, f64)> {
+        if effect == "adc_saturation" { output::ends(self.records()) } else { Vec::new() }
+    }
+
     fn evidence(&self, effect: &'static str, fit: &Fit) -> Vec<String> {
         evidence::sentences(effect, fit)
     }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::model::ContactModel;
 use super::problem::{Fitted, Problem, Slot};
 use crate::diagnose::analysis::{Channel, Estimate, Fit, LogFit, Role};
+use crate::diagnose::record::Record;
 use crate::diagnose::search;
 use crate::files::model_file::{Extension, Interval, ModelFile};
 use crate::fit::bounds::{Parameter, Scale};
@@ -139,6 +140,22 @@ fn add_balance(problem: &Problem, fitted: &Fitted, role: Role, origins: &[f64], 
             samples_per_noise: 1.0,
         });
     }
+}
+
+/// Where the training logs' channels end: those ends at which one clips.
+pub fn ends(records: &[Record]) -> Vec<(&'static str, f64)> {
+    let train = || records.iter().filter(|record| record.role == Role::Train);
+    let lowest = |end: fn(&Record) -> Option<f64>| train().filter_map(end).reduce(f64::min);
+    let highest = |end: fn(&Record) -> Option<f64>| train().filter_map(end).reduce(f64::max);
+    [
+        ("friction_low_nm", lowest(|record| record.friction_nm.clipping.low)),
+        ("friction_high_nm", highest(|record| record.friction_nm.clipping.high)),
+        ("normal_force_low_n", lowest(|record| record.normal_n.clipping.low)),
+        ("normal_force_high_n", highest(|record| record.normal_n.clipping.high)),
+    ]
+    .into_iter()
+    .filter_map(|(name, end)| Some((name, end?)))
+    .collect()
 }
 
 /// The fitted model as a file.
