@@ -1,6 +1,6 @@
 //! What a residual is looked at over: quantities of a log's motion and load at any time.
 //!
-//! From the log alone, without a model: speed is the slope of the smoothed position; sliding distance,
+//! From the log alone, without a model: speed is the smoothed column, or the slope of the smoothed position; sliding distance,
 //! dissipated energy (of the measured friction or effort) and heat (the same, forgotten with a time constant of
 //! `COOLING_S`) start at zero in each log; dwell is the rest before the last breakaway and counts for
 //! `FRESH_S` of motion. Quantities of which a log knows nothing are left out.
@@ -19,6 +19,10 @@ const LEAST_REST_S: f64 = 0.05;
 const RATE_HZ: f64 = 500.0;
 /// Share of the typical speed below which a drive rests.
 const REST_SHARE: f64 = 0.01;
+/// Share of samples at which an even signal bends.
+const EVEN_SHARE: f64 = 0.05;
+/// Bend that counts as rounding, of the largest step.
+const ROUNDING: f64 = 1e-6;
 
 /// A quantity over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,10 +67,9 @@ impl Coordinates {
         let signal = |signal: Signal| log.signal(signal).map(thin);
         let position = signal(if linear { Signal::Position } else { Signal::M2Angle });
         let speed = match (&position, signal(Signal::M2Speed)) {
-            (_, Some(speed)) => speed,
-            (Some(position), None) => {
-                smooth::slope(&time_s, position, super::noise::standard_deviation(position)).values
-            }
+            // Noise of a speed column would end every rest.
+            (_, Some(speed)) => smooth::signal(&speed, noise_of(&speed)).values,
+            (Some(position), None) => smooth::slope(&time_s, position, noise_of(position)).values,
             (None, None) => vec![0.0; time_s.len()],
         };
         let typical = quantile(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.9);
@@ -185,6 +188,18 @@ impl Coordinates {
     }
 }
 
+/// Standard deviation of a signal's noise. One that goes on evenly but for a few samples has none: what it changes by
+/// from sample to sample is its course and not its resolution.
+fn noise_of(values: &[f64]) -> f64 {
+    let largest = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+    let bent = |w: &&[f64]| (w[2] - 2.0 * w[1] + w[0]).abs() > ROUNDING * largest;
+    let bends = values.windows(3).filter(bent).count();
+    if (bends as f64) < EVEN_SHARE * values.len() as f64 {
+        return 0.0;
+    }
+    super::noise::standard_deviation(values)
+}
+
 /// A quantile of values; NaN are left out.
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut known: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
@@ -197,7 +212,105 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::noise::tests::white;
     use super::*;
+
+    /// Rests of a drive between its movements, s: (start, length).
+    const RESTS: [(f64, f64); 3] = [(1.0, 0.1), (2.1, 0.5), (3.6, 2.0)];
+    const END_S: f64 = 7.0;
+
+    /// Speed of a drive that moves with 1 rad/s one way, then the other, and rests between.
+    fn resting(t: f64) -> f64 {
+        let rests = RESTS.iter().any(|(from, length)| (*from..from + length).contains(&t));
+        let done = RESTS.iter().filter(|(from, _)| *from <= t).count();
+        match (rests, done % 2) {
+            (true, _) => 0.0,
+            (false, 0) => 1.0,
+            (false, _) => -1.0,
+        }
+    }
+
+    /// Its log: noise of angle and speed as standard deviations, where there are such columns.
+    fn log_of(rate_hz: f64, angle_noise: Option<f64>, speed_noise: Option<f64>) -> Log {
+        let count = (END_S * rate_hz) as usize;
+        let time: Vec<f64> = (0..count).map(|i| i as f64 / rate_hz).collect();
+        let speed: Vec<f64> = time.iter().map(|t| resting(*t)).collect();
+        let mut angle = 0.0;
+        let angles: Vec<f64> = speed
+            .iter()
+            .map(|v| {
+                angle += v / rate_hz;
+                angle
+            })
+            .collect();
+        let noisy = |values: &[f64], std: f64, seed: u64| -> Vec<f64> {
+            values.iter().zip(white(count, seed)).map(|(x, e)| x + std * e).collect()
+        };
+        let mut log = Log::default();
+        log.set_signal(Signal::M2Torque, speed.iter().map(|v| 0.3 * v).collect());
+        if let Some(std) = angle_noise {
+            log.set_signal(Signal::M2Angle, noisy(&angles, std, 5));
+        }
+        if let Some(std) = speed_noise {
+            log.set_signal(Signal::M2Speed, noisy(&speed, std, 6));
+        }
+        log.set_signal(Signal::Time, time);
+        log
+    }
+
+    /// The view holds each rest's length for as long as the breakaway after it is fresh, and nothing elsewhere.
+    #[track_caller]
+    fn dwells_are_seen(log: &Log) {
+        let coordinates = Coordinates::new(log);
+        let dwell = &coordinates.list.iter().find(|c| c.name == "dwell").unwrap().values;
+        // Smoothing and the threshold of speed shift both ends of a rest by some samples.
+        const NEAR_S: f64 = 0.02;
+        for (t, value) in coordinates.time_s.iter().zip(dwell) {
+            let after = RESTS.iter().find(|(from, length)| {
+                let since = t - from - length;
+                since > NEAR_S && since < FRESH_S - NEAR_S
+            });
+            let around = RESTS.iter().any(|(from, length)| {
+                let since = t - from - length;
+                (-NEAR_S..FRESH_S + NEAR_S).contains(&since)
+            });
+            match after {
+                Some((_, length)) => assert!((value - length).abs() < NEAR_S, "{t}: {value} of {length}"),
+                None => assert!(around || value.is_nan(), "{t}: {value}"),
+            }
+        }
+    }
+
+    #[test]
+    fn the_rest_before_a_breakaway_is_seen_from_an_encoders_angle() {
+        // Two counts of 480 000 a turn.
+        dwells_are_seen(&log_of(1000.0, Some(2.6e-5), None));
+        dwells_are_seen(&log_of(5000.0, Some(2.6e-5), None));
+    }
+
+    #[test]
+    fn the_rest_before_a_breakaway_is_seen_from_an_angle_without_noise() {
+        dwells_are_seen(&log_of(1000.0, Some(0.0), None));
+        dwells_are_seen(&log_of(500.0, Some(0.0), None));
+    }
+
+    #[test]
+    fn the_rest_before_a_breakaway_is_seen_from_a_speed_with_and_without_noise() {
+        // The noise is at times above the threshold of rest.
+        dwells_are_seen(&log_of(1000.0, None, Some(0.01)));
+        dwells_are_seen(&log_of(1000.0, Some(2.6e-5), Some(0.01)));
+        dwells_are_seen(&log_of(1000.0, None, Some(0.0)));
+    }
+
+    #[test]
+    fn a_drive_that_never_rests_has_no_dwell() {
+        let mut log = log_of(1000.0, None, None);
+        let angle: Vec<f64> = log.time_s().iter().map(|t| (2.0 * t).sin()).collect();
+        log.set_signal(Signal::M2Angle, angle);
+        let coordinates = Coordinates::new(&log);
+        let dwell = coordinates.list.iter().find(|c| c.name == "dwell").unwrap();
+        assert!(dwell.values.iter().all(|value| value.is_nan()));
+    }
 
     #[test]
     fn a_quantile_leaves_out_what_is_not_known() {
