@@ -28,5 +28,7 @@ pub mod selection;
 pub mod shadows;
 pub mod smooth;
 pub mod structure;
+#[cfg(test)]
+mod synthetic;
 pub mod uncertainty;
 pub mod verdict;

@@ -17,7 +17,7 @@ use super::screening::estimated_gain;
 /// Combinations that go on into the next round.
 const BEAM: usize = 2;
 /// Most effects of one subsystem at once.
-const MOST_EFFECTS: usize = 3;
+pub(super) const MOST_EFFECTS: usize = 3;
 /// Threads that fit.
 const THREADS: usize = 2;
 /// A rival that scores within this share of the best one's likelihood gain goes into the beam.
@@ -157,7 +157,7 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
 }
 
 /// Whether what a step gains in the subsystem's own signal is more than imperfection, of the noise or of the effects that are in already.
-fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Independent) -> bool {
+pub(super) fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Independent) -> bool {
     let fall = |from, to| likelihood_ratio(from, to, Role::Train, independent).1;
     let of_baseline = fall(base, to) - fall(base, from);
     fall(from, to) > MATERIAL_SHARE && of_baseline > IMPERFECT_SHARE
@@ -290,5 +290,57 @@ impl Selection {
         let mut ordered: Vec<(f64, &'static str)> = self.chosen.iter().map(|e| (loss(e), *e)).collect();
         ordered.sort_by(|a, b| b.0.total_cmp(&a.0));
         self.chosen = ordered.into_iter().map(|(_, effect)| effect).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{Wave, Waves, wave};
+    use super::*;
+
+    fn selected(waves: Vec<Wave>) -> Selection {
+        select(&Waves::new(waves), &|_| ()).unwrap()
+    }
+
+    #[test]
+    fn the_two_effects_that_are_there_are_found_the_stronger_first_and_no_third() {
+        let found = selected(vec![
+            wave("wear_drift", 0.8),
+            wave("viscous_film", 0.0),
+            wave("disc_angle", 1.5),
+            wave("bell_curve", 0.0),
+            wave("static_ageing", 0.0),
+        ]);
+        assert_eq!(found.chosen, ["disc_angle", "wear_drift"]);
+        assert!(found.unconfirmed.is_empty());
+        let size = |id| found.extended().unwrap().get(Some(id), "size").unwrap();
+        // Amplitude of a wave in white noise over two logs: √(2/8000) of it.
+        assert!(
+            (size("disc_angle").value - 1.5).abs() < 0.06 && (size("wear_drift").value - 0.8).abs() < 0.06
+        );
+    }
+
+    #[test]
+    fn a_clean_residual_asks_for_no_effect() {
+        let found =
+            selected(vec![wave("wear_drift", 0.0), wave("viscous_film", 0.0), wave("disc_angle", 0.0)]);
+        assert!(found.chosen.is_empty() && found.unconfirmed.is_empty());
+    }
+
+    #[test]
+    fn what_is_significant_but_hardly_lowers_the_error_is_not_taken() {
+        // 0.15²/2 of the noise's variance: 45 in log-likelihood over 8000 samples, and 1.1 % of the mean square.
+        let found = selected(vec![wave("disc_angle", 1.5), wave("viscous_film", 0.15)]);
+        assert_eq!(found.chosen, ["disc_angle"]);
+        let both = found.score(&["disc_angle", "viscous_film"]).unwrap();
+        assert!(both.penalised > found.score(&["disc_angle"]).unwrap().penalised + 10.0, "it is significant");
+    }
+
+    #[test]
+    fn an_effect_that_gains_only_on_the_training_logs_is_taken_out_and_told() {
+        let only_trained = Wave { id: "wear_drift", trained: 0.9, held_out: 0.0 };
+        let found = selected(vec![wave("disc_angle", 1.5), only_trained, wave("viscous_film", 0.0)]);
+        assert_eq!(found.chosen, ["disc_angle"]);
+        assert_eq!(found.unconfirmed, ["wear_drift"]);
     }
 }

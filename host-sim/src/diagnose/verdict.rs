@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 use super::analysis::{Analysis, Fit, Role};
 use super::coordinates::Coordinates;
-use super::score::likelihood_ratio;
-use super::selection::{Selection, without};
+use super::score::{Score, likelihood_ratio};
+use super::selection::{MOST_EFFECTS, Selection, is_material, without};
 use super::structure::{Structure, structures};
 
 /// Structured rest that an explanation may leave, of what the baseline leaves.
@@ -210,32 +210,98 @@ impl Judged {
                 "it gains, but what the baseline leaves is within the imperfection that any model of a rig has".into()
             } else if !named && chosen.contains(&id) {
                 self.too_little(id)
-            } else if chosen.is_empty() {
-                format!(
-                    "it takes {:.2} % off the mean square of the residual: {:.1} in log-likelihood, {:.1} short of the price of its parameters",
-                    100.0 * score.share,
-                    score.likelihood,
-                    -score.penalised
-                )
-            } else if set.len() > chosen.len() {
-                format!(
-                    "beside {} it gains {:.1} in log-likelihood and misses the price of its parameters by {behind:.1}",
-                    chosen.join(" and "),
-                    score.likelihood - best.likelihood
-                )
+            } else if behind < 0.0 {
+                self.turned_down(set, best, score)
             } else {
-                format!(
-                    "in the place of {} it explains {:.0} % of the log-likelihood, {:.1} less",
-                    chosen.iter().filter(|c| !set.contains(c)).copied().collect::<Vec<_>>().join(" and "),
-                    100.0 * (score.likelihood / best.likelihood.max(1e-9)).max(0.0),
-                    best.likelihood - score.likelihood
-                )
+                self.too_dear(set, best, score)
             };
-            let probability = ((-behind).exp() / (1.0 + (-behind).exp())).clamp(0.0, 0.5);
+            let probability = (1.0 / (1.0 + behind.exp())).clamp(0.0, 0.5);
             rejected.push((behind, Rejected { id, probability, why }));
         }
         rejected.sort_by(|a, b| a.0.total_cmp(&b.0));
         self.rejected = rejected.into_iter().map(|(_, r)| r).take(MOST_REJECTED).collect();
+    }
+
+    /// Why a combination with an effect that was not chosen scores less than the chosen one.
+    fn too_dear(&self, set: &[&'static str], best: Score, score: Score) -> String {
+        let chosen = &self.selection.chosen;
+        let behind = best.penalised - score.penalised;
+        let gain = score.likelihood - best.likelihood;
+        let instead = instead_of(chosen, set);
+        if !instead.is_empty() {
+            let place = format!("in the place of {}", instead.join(" and "));
+            if gain >= 0.0 {
+                return format!(
+                    "{place} it explains {gain:.1} more in log-likelihood, {behind:.1} short of the price of its parameters"
+                );
+            }
+            let share = 100.0 * (score.likelihood / best.likelihood.max(1e-9)).max(0.0);
+            return format!("{place} it explains {share:.0} % of the log-likelihood, {:.1} less", -gain);
+        }
+        let beside = beside(chosen);
+        if gain < 0.05 {
+            return format!(
+                "{beside}it gains nothing, and is {behind:.1} short of the price of its parameters"
+            );
+        }
+        if chosen.is_empty() {
+            return format!(
+                "it takes {:.2} % off the mean square of the residual: {gain:.1} in log-likelihood, {behind:.1} short of \
+                 the price of its parameters",
+                100.0 * score.share.max(0.0)
+            );
+        }
+        format!(
+            "{beside}it gains {gain:.1} in log-likelihood and misses the price of its parameters by {behind:.1}"
+        )
+    }
+
+    /// Why a combination was not chosen that scores better on the training logs: what else it would have had to do.
+    fn turned_down(&self, set: &[&'static str], best: Score, score: Score) -> String {
+        let selection = &self.selection;
+        let chosen = &selection.chosen;
+        let (gain, ahead) = (score.likelihood - best.likelihood, score.penalised - best.penalised);
+        let instead = instead_of(chosen, set);
+        let place = match instead.as_slice() {
+            [] => beside(chosen),
+            instead => format!("in the place of {} ", instead.join(" and ")),
+        };
+        let won = format!(
+            "{place}it explains {gain:.1} more in log-likelihood, {ahead:.1} beyond the price of its parameters"
+        );
+        let (Some(base), Some(now), Some(then)) =
+            (selection.baseline(), selection.extended(), selection.fit(set))
+        else {
+            return won;
+        };
+        if set.len() > MOST_EFFECTS {
+            return format!(
+                "{won}, but {MOST_EFFECTS} effects of one subsystem are the most that logs can tell apart"
+            );
+        }
+        if instead.is_empty() && !is_material(base, now, then, &selection.independent) {
+            let (_, share) = likelihood_ratio(now, then, Role::Train, &selection.independent);
+            let (_, of_base) = likelihood_ratio(base, now, Role::Train, &selection.independent);
+            return format!(
+                "{won}, but it takes only {:.2} % off the mean square of what is left, {:.2} % of the baseline's: no more \
+                 than a model of a rig gets wrong",
+                100.0 * share,
+                100.0 * (score.share - of_base)
+            );
+        }
+        match (now.nrmse(Role::Holdout), then.nrmse(Role::Holdout)) {
+            (Some(from), Some(to)) if to > from => format!(
+                "{won}, but with it the error on the held-out logs is {:.2} % and not {:.2} %",
+                100.0 * to,
+                100.0 * from
+            ),
+            _ if instead.is_empty() => {
+                format!("{won}, but the search, which adds and takes out one effect at a time, left it out")
+            }
+            _ => format!(
+                "{won}, but the search, which adds and takes out one effect at a time, did not come back to it"
+            ),
+        }
     }
 
     /// Why an effect that was the best at hand is not named.
@@ -256,6 +322,15 @@ impl Judged {
     }
 }
 
+/// Chosen effects that a combination does without.
+fn instead_of(chosen: &[&'static str], set: &[&'static str]) -> Vec<&'static str> {
+    chosen.iter().filter(|id| !set.contains(id)).copied().collect()
+}
+
+fn beside(chosen: &[&'static str]) -> String {
+    if chosen.is_empty() { String::new() } else { format!("beside {} ", chosen.join(" and ")) }
+}
+
 fn held_out(less: &Fit, full: &Fit) -> String {
     match (less.nrmse(Role::Holdout), full.nrmse(Role::Holdout)) {
         (Some(from), Some(to)) if from > 0.0 => {
@@ -266,5 +341,104 @@ fn held_out(less: &Fit, full: &Fit) -> String {
             )
         }
         _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{Wave, Waves, wave};
+    use super::*;
+
+    fn why(judged: &Judged, id: &str) -> String {
+        let rejected = judged.rejected.iter().find(|rejected| rejected.id == id);
+        rejected.unwrap_or_else(|| panic!("{id} is not among the rejected")).why.clone()
+    }
+
+    #[test]
+    fn noise_has_no_cause() {
+        let judged = Waves::new(vec![wave("disc_angle", 0.0), wave("wear_drift", 0.0)]).judged();
+        assert_eq!(judged.verdict, Verdict::None);
+        assert!(judged.causes.is_empty() && judged.indistinguishable.is_empty());
+        let why = why(&judged, "wear_drift");
+        assert!(why.contains("short of the price of its parameters") && !why.contains(" -"), "{why}");
+    }
+
+    #[test]
+    fn a_cause_that_explains_the_residual_is_named_and_the_others_are_not() {
+        let judged = Waves::new(vec![wave("disc_angle", 2.5), wave("wear_drift", 0.0)]).judged();
+        assert_eq!(judged.verdict, Verdict::Named);
+        let ids: Vec<&str> = judged.causes.iter().map(|cause| cause.id).collect();
+        assert_eq!(ids, ["disc_angle"]);
+        assert!(judged.causes[0].probability > 0.99);
+        // 2.5²/2 of noise's 1 + 2.5²/2 are 76 % of the mean square; the loss counts large residuals for less.
+        let takes = judged.causes[0].evidence.iter().find(|sentence| sentence.contains("% off")).unwrap();
+        let share: f64 = takes.split(' ').nth(2).unwrap().parse().unwrap();
+        assert!((72.0..77.0).contains(&share), "{takes}");
+        assert_eq!(judged.result().unwrap().effects, ["disc_angle"]);
+    }
+
+    #[test]
+    fn a_residual_that_nothing_explains_is_unknown_and_the_nearest_name_is_not_given() {
+        let strange = Waves { unexplained: 2.5, ..Waves::new(vec![wave("disc_angle", 0.0)]) };
+        let judged = strange.judged();
+        assert_eq!(judged.verdict, Verdict::Unknown);
+        assert!(judged.causes.is_empty());
+
+        let half = Waves { unexplained: 2.5, ..Waves::new(vec![wave("disc_angle", 2.5)]) };
+        let judged = half.judged();
+        assert_eq!(judged.verdict, Verdict::Unknown);
+        assert_eq!(judged.selection.chosen, ["disc_angle"]);
+        assert!(judged.causes.is_empty(), "half of the structured residual is left");
+        assert!(judged.result().unwrap().effects.is_empty());
+        let why = why(&judged, "disc_angle");
+        assert!(why.starts_with("the nearest that the library has (disc_angle), but "), "{why}");
+    }
+
+    #[test]
+    fn two_causes_of_the_same_shape_are_told_to_be_indistinguishable() {
+        // Waves of one frequency are one effect under two names: the second has no column of its own to add.
+        let judged = Waves {
+            twins: Some(("disc_angle", "wear_drift")),
+            ..Waves::new(vec![wave("disc_angle", 2.5), wave("wear_drift", 0.0)])
+        }
+        .judged();
+        assert_eq!(judged.verdict, Verdict::Named);
+        assert_eq!(judged.indistinguishable.len(), 1, "{:?}", judged.indistinguishable);
+        assert!(judged.causes[0].probability < 0.51);
+    }
+
+    #[test]
+    fn the_reason_against_a_rival_that_scores_better_is_the_one_that_it_was_turned_down_for() {
+        let faint = Waves::new(vec![wave("disc_angle", 2.5), wave("viscous_film", 0.15)]).judged();
+        let faint = why(&faint, "viscous_film");
+        assert!(faint.starts_with("beside disc_angle it explains "), "{faint}");
+        // 0.15²/2 of noise's variance.
+        let only = " beyond the price of its parameters, but it takes only ";
+        assert!(faint.contains(&format!("{only}0.9")) || faint.contains(&format!("{only}1.")), "{faint}");
+
+        let only_trained = Wave { id: "wear_drift", trained: 0.9, held_out: 0.0 };
+        let judged = Waves::new(vec![wave("disc_angle", 2.5), only_trained]).judged();
+        assert_eq!(
+            why(&judged, "wear_drift"),
+            "it gains on the training logs and less than a fifth of that on the held-out logs"
+        );
+
+        let names = ["disc_angle", "wear_drift", "viscous_film", "bell_curve"];
+        let mut fourth = Waves::new(names.into_iter().map(|id| wave(id, 2.5)).collect()).judged();
+        fourth.selection.fits.insert(
+            super::super::selection::sorted(&names),
+            Arc::new(fourth.analysis.fit(&names, None).unwrap()),
+        );
+        fourth.rejected.clear();
+        fourth.reject();
+        let left = names.iter().find(|id| !fourth.selection.chosen.contains(id)).unwrap();
+        let left = why(&fourth, left);
+        assert!(
+            left.ends_with("but 3 effects of one subsystem are the most that logs can tell apart"),
+            "{left}"
+        );
+        for judged in [&fourth, &judged] {
+            assert!(judged.rejected.iter().all(|r| (0.0..=0.5).contains(&r.probability)));
+        }
     }
 }
