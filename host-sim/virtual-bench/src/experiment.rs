@@ -83,13 +83,14 @@ impl Request {
         Ok(HostPlant::new(&parameters, self.experiment.seed)?)
     }
 
-    /// Tick of the experiment at which the capture is triggered: it holds a second on either side.
-    fn capture_tick(&self) -> u32 {
+    /// Tick of the experiment at which the capture is triggered: it holds a second on either side. No later than the
+    /// last row of the log, whose coming is the sign to trigger.
+    fn capture_tick(&self, total: u32, every_ticks: u16) -> u32 {
         let start_s = phase_start_s(&self.experiment).unwrap_or_default();
         // The cast saturates.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let tick = ((start_s + CAPTURE_AFTER_S) * f64::from(TICK_HZ)) as u32;
-        tick
+        tick.min(total.saturating_sub(u32::from(every_ticks)))
     }
 
     /// Requests that make the firmware know the rig and the observer's model.
@@ -255,7 +256,7 @@ fn operate(
     let mut capture_at = None;
     if request.capture {
         client.request(Command::CaptureArm(CaptureTrigger::Command));
-        capture_at = Some(request.capture_tick().min(total));
+        capture_at = Some(request.capture_tick(total, every_ticks));
     }
     let mut procedure = RunExperiment::new(experiment, RunOptions { every_ticks, ..RunOptions::default() });
     let mut ticks = None;
@@ -333,4 +334,19 @@ pub fn boot(desk: &mut Desk) -> Result<(), BenchError> {
     desk.wait_until(BOOT_NS)?;
     let wrong = desk.wrong_pins()?;
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Firmware(wrong.join("; "))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_capture_is_triggered_by_a_row_that_comes_even_where_the_last_step_is_late() {
+        let mut request = Request::assumed("fig20").unwrap();
+        // The load's step at 4 s, and 0.9 s more.
+        assert_eq!(request.capture_tick(100_000, 10), 49_000);
+        request.experiment =
+            ExperimentFile::named_or_read("fig20", &[("duration_s".into(), "4.5".into())]).unwrap();
+        assert_eq!(request.capture_tick(45_000, 10), 44_990);
+    }
 }
