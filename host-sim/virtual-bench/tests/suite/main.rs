@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod bits;
+mod chain;
 mod cost;
 mod defmt;
 mod faults;
