@@ -10,7 +10,7 @@ use super::contact::ContactAnalysis;
 use super::selection::without;
 use super::verdict::{Judged, Verdict};
 use crate::design::family::{Family, Setting};
-use crate::design::{self, Effort, Proposal, text};
+use crate::design::{self, Effort, text};
 use crate::files::effect_id::Subsystem;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
@@ -25,6 +25,8 @@ const SPEED_RPM: f64 = 60.0;
 const HOLD_S: f64 = 1.5;
 /// Separation below which a repetition or a longer log is needed to tell two models apart.
 const CLEAR: f64 = 1.0;
+/// Separation below which no repetition helps.
+const HOPELESS: f64 = 0.1;
 
 /// What is known about the rig where the logs have contact.
 #[derive(Clone, Copy)]
@@ -95,19 +97,22 @@ fn tell_apart(
         .collect::<Option<_>>()?;
     let best = design::propose(bench.rig, &models, Effort::QUICK, progress).ok()?.into_iter().next()?;
     let why = format!("to tell {named} and {rival} apart");
+    let predicted = predicted(best.separation(), best.sentence());
     Some(NextExperiment {
-        sentence: format!("{why}: {}; {FILE} holds it", predicted(&best)),
+        sentence: format!("{why}: {predicted}; {FILE} holds it"),
         file: Some(text::toml("next", &why, &best.setting.course(), bench.rig)),
     })
 }
 
 /// The experiment and what it is expected to show.
-fn predicted(best: &Proposal) -> String {
-    let sentence = best.sentence();
-    if best.separation() >= CLEAR {
+fn predicted(separation: f64, sentence: String) -> String {
+    if separation >= CLEAR {
         return sentence;
     }
-    format!("{sentence}, so that even this one, the best of those tried, has to be repeated")
+    if separation >= HOPELESS {
+        return format!("{sentence}, so that even this one, the best of those tried, has to be repeated");
+    }
+    format!("no experiment that was tried does; on the best, {sentence}")
 }
 
 fn experiment(id: &str) -> (&'static str, Family) {
@@ -257,6 +262,14 @@ speed_rpm = 60.0
             next.sentence
         );
         run(&next.file.unwrap(), &rig, &model);
+    }
+
+    #[test]
+    fn a_small_separation_is_not_told_as_a_clear_one() {
+        let told = |separation| predicted(separation, "this".into());
+        assert_eq!(told(5.1), "this");
+        assert_eq!(told(0.4), "this, so that even this one, the best of those tried, has to be repeated");
+        assert_eq!(told(0.01), "no experiment that was tried does; on the best, this");
     }
 
     #[test]
