@@ -134,9 +134,14 @@ fn line(name: &str, value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use model_core::extension::encoder_eccentricity::EncoderEccentricity;
 
+    use super::super::synthetic::{contact_of, said, sliding_log};
+    use super::super::verdict::Verdict;
     use super::*;
+    use crate::files::signal::Signal;
 
     fn extension(id: &str, values: &[(&str, f64)]) -> Extension {
         Extension {
@@ -176,6 +181,22 @@ mod tests {
         let read = with(extension, &remark).unwrap();
         assert_eq!(read.extensions[0].get("friction_high_nm"), Some(3.2));
         assert!(read.extensions[0].get("friction_low_nm").unwrap() < -1e3, "no end there");
+    }
+
+    #[test]
+    fn the_ends_written_are_those_that_the_training_logs_show() {
+        let clipped = |limit| sliding_log(Some((Signal::FrictionTorque, limit)));
+        let contact = contact_of(&clipped(2.5), &clipped(2.0));
+        assert_eq!(contact.constants(CLIPPING), [("friction_high_nm", 2.5)]);
+        assert_eq!(contact.constants("thermal_fade"), []);
+
+        let mut part = said(Subsystem::Friction, Verdict::Named, &[CLIPPING]);
+        // Seen in the channel itself: the fit is the baseline's.
+        part.selection.fits.insert(Vec::new(), Arc::new(contact.fit(&[], None).unwrap()));
+        let written =
+            ModelFile::parse("model-extended.toml", &text(&[part], Some(&contact)).unwrap()).unwrap();
+        assert_eq!(written.extensions.len(), 1);
+        assert_eq!(written.extensions[0].get("friction_high_nm"), Some(2.5));
     }
 
     #[test]

@@ -9,10 +9,15 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::analysis::{Analysis, Channel, Estimate, Fit, LogFit, Role};
+use super::contact::ContactAnalysis;
 use super::noise::tests::white;
 use super::selection::select;
-use super::verdict::{Judged, judge};
+use super::verdict::{Cause, Judged, Verdict, judge};
 use crate::files::effect_id::Subsystem;
+use crate::files::log::Log;
+use crate::files::model_file::ModelFile;
+use crate::files::rig_file::RigFile;
+use crate::files::signal::Signal;
 
 /// Samples of a log.
 pub(super) const COUNT: usize = 4000;
@@ -73,6 +78,42 @@ impl Waves {
         add(self.unexplained, self.shape(None));
         residual
     }
+}
+
+/// A subsystem about which something was said, whatever the reason.
+pub(super) fn said(subsystem: Subsystem, verdict: Verdict, ids: &[&'static str]) -> Judged {
+    let mut judged = Waves { subsystem, ..Waves::new(Vec::new()) }.judged();
+    judged.verdict = verdict;
+    let cause = |id: &&'static str| Cause { id, probability: 0.9, weight: 50.0, evidence: Vec::new() };
+    judged.causes = ids.iter().map(cause).collect();
+    judged
+}
+
+/// A contact log: elements slide steadily under a load that swings from 30 to 70 N, with a coefficient of 0.7. Where
+/// `limit` is given, that channel shows nothing above it.
+pub(super) fn sliding_log(limit: Option<(Signal, f64)>) -> Log {
+    let time: Vec<f64> = (0..2500).map(|i| 2e-3 * f64::from(i)).collect();
+    let noise = |seed, std: f64| white(time.len(), seed).into_iter().map(move |e| std * e);
+    let load: Vec<f64> =
+        time.iter().zip(noise(11, 0.2)).map(|(t, e)| 50.0 + 20.0 * (2.0 * t).sin() + e).collect();
+    let friction = load.iter().zip(noise(12, 0.01)).map(|(load, e)| 0.06 * 0.7 * load + e).collect();
+    let mut log = Log::default();
+    log.set_signal(Signal::M2Speed, noise(13, 1e-3).map(|e| 3.0 + e).collect());
+    log.set_signal(Signal::NormalForce, load);
+    log.set_signal(Signal::FrictionTorque, friction);
+    if let Some((signal, limit)) = limit {
+        let shown = log.signal(signal).unwrap().iter().map(|x| x.min(limit)).collect();
+        log.set_signal(signal, shown);
+    }
+    log.set_signal(Signal::Time, time);
+    log
+}
+
+/// The analysis of a log to fit to and of one that is held out.
+pub(super) fn contact_of(train: &Log, holdout: &Log) -> ContactAnalysis {
+    let rig = RigFile::assumed_rig(&[]).unwrap();
+    let model = ModelFile::assumed(&[]).unwrap();
+    ContactAnalysis::new(&rig, &model, &[(train, Role::Train), (holdout, Role::Holdout)]).unwrap()
 }
 
 impl Analysis for Waves {
