@@ -190,13 +190,6 @@ mod tests {
         stays(unknown(Pressure), named(Drive, &["shaft_torsion"]));
     }
 
-    #[test]
-    fn nothing_is_its_own_shadow() {
-        let mut alone = [named(Drive, &["shaft_torsion", "presliding"])];
-        assert!(settled(&mut alone, None).is_empty());
-        assert_eq!(alone[0].causes.len(), 2);
-    }
-
     /// Settles with the channels of a training log; the held-out one is whole.
     fn settled_with(train: &Log, judged: &mut [Judged]) -> Vec<String> {
         settled(judged, Some(&contact_of(train, &sliding_log(None))))
