@@ -23,6 +23,8 @@ const LOAD_SHARE: f64 = 0.8;
 const SPEED_RPM: f64 = 60.0;
 /// Holds, s.
 const HOLD_S: f64 = 1.5;
+/// Relative standard deviation of a parameter that the logs leave open.
+const OPEN: f64 = 0.5;
 /// Separation below which a repetition or a longer log is needed to tell two models apart.
 const CLEAR: f64 = 1.0;
 /// Separation below which no repetition helps.
@@ -93,7 +95,7 @@ fn tell_apart(
     let instead = [without(chosen, named), vec![*rival]].concat();
     let models: Vec<ModelFile> = [chosen, &instead]
         .into_iter()
-        .map(|effects| bench.contact.to_model_file(part.selection.fit(effects)?).ok())
+        .map(|effects| bench.contact.to_model_file(part.selection.fit(effects)?).ok().map(bounded))
         .collect::<Option<_>>()?;
     let best = design::propose(bench.rig, &models, Effort::QUICK, progress).ok()?.into_iter().next()?;
     let why = format!("to tell {named} and {rival} apart");
@@ -102,6 +104,18 @@ fn tell_apart(
         sentence: format!("{why}: {predicted}; {FILE} holds it"),
         file: Some(text::toml("next", &why, &best.setting.course(), bench.rig)),
     })
+}
+
+/// The model with parameters that the logs leave open known to half of their size: beyond it, what a parameter's change
+/// does to a prediction is no longer in proportion to it, and the search takes it to be.
+fn bounded(mut model: ModelFile) -> ModelFile {
+    let sizes: Vec<(&str, f64)> = model.parameters().filter(|(_, value)| *value != 0.0).collect();
+    for (name, value) in sizes {
+        if let Some(interval) = model.intervals.get_mut(name) {
+            interval.std = interval.std.min(OPEN * value.abs());
+        }
+    }
+    model
 }
 
 /// The experiment and what it is expected to show.
@@ -161,6 +175,7 @@ mod tests {
     use crate::files::effect_id::EFFECTS;
     use crate::files::experiment_file::ExperimentFile;
     use crate::files::log::Log;
+    use crate::files::model_file::Interval;
     use crate::lockstep::{self, Setup};
 
     const LUGRE: &str = r#"
@@ -262,6 +277,18 @@ speed_rpm = 60.0
             next.sentence
         );
         run(&next.file.unwrap(), &rig, &model);
+    }
+
+    #[test]
+    fn a_parameter_that_the_logs_leave_open_is_known_to_half_of_its_size() {
+        let mut model = ModelFile::parse("model", LUGRE).unwrap();
+        let interval = |std| Interval { std, low: -1.0, high: 1.0 };
+        model
+            .intervals
+            .extend([("a0", 0.01), ("a1", 80.0), ("a2_s_per_m", 3.0)].map(|(n, s)| (n.into(), interval(s))));
+        let bounded = bounded(model);
+        let std = |name: &str| bounded.intervals[name].std;
+        assert_eq!((std("a0"), std("a1"), std("a2_s_per_m")), (0.01, 0.15, 3.0));
     }
 
     #[test]
