@@ -18,15 +18,14 @@ use std::process::ExitCode;
 use virtual_bench::experiment::{self, Request};
 use virtual_bench::firmware_build::root;
 
-/// What is on the disc: none of the numbers that matter is the assumed one.
-const RUBBER: &str = "kind = \"series\"\n[parameters]\nsigma0_n_per_m = 1.6e7\na0 = 0.56\na1 = 0.62\nv0_m_s = 0.4\n\
-                      k_u_n_per_m = 2.8e4\nc_u_n_s_per_m = 170.0\n";
-
 /// The observer's residual under the extended model over that under the plain one is at most so many times the
-/// ratio of the diagnosis. Not 1: the diagnosis sees both channels through the rig file's bridges, the torque ring included, and
-/// takes an offset out of each log; the observer has the amplifier's low-pass alone, so load steps and reversals
-/// leave it about 1 % that no model of rubber takes away. Not more: twice what heat leaves is a third of what it did.
-const MOST_OF_THE_PROMISED_RATIO: f64 = 2.0;
+/// ratio of the diagnosis, or it is down to what the rubber on the disc itself would leave. The diagnosis sees the friction
+/// channel through the rig file's torque ring; the observer leaves the ring out (600 Hz, a damping ratio of 0.02), and its
+/// ringing after load steps and reversals stays in the residual, about 1 %, whatever the model of the rubber.
+const MOST_OF_THE_DIAGNOSIS: f64 = 2.0;
+
+/// Down to what the rubber itself would leave: a tenth is the share of the noise and of parameters that are fitted.
+const MOST_OF_THE_RUBBER_ITSELF: f64 = 1.1;
 
 struct Chain {
     effect: &'static str,
@@ -37,11 +36,12 @@ struct Chain {
 }
 
 impl Chain {
-    fn new(effect: &'static str, parameters: &str) -> Self {
-        let text = format!("{RUBBER}\n[[extension]]\nid = \"{effect}\"\n{parameters}");
+    /// The rubber of the file that is named after the effect.
+    fn new(effect: &'static str) -> Self {
+        let hidden = root().join(format!("host-sim/virtual-bench/experiments/{effect}.toml"));
         Self {
             effect,
-            hidden: ModelFile::parse("hidden.toml", &text).unwrap(),
+            hidden: ModelFile::read(&hidden, &[]).unwrap(),
             rig: root().join("host-sim/rigs/assumed.toml"),
             model: root().join("host-sim/models/assumed.toml"),
             folder: Path::new(env!("CARGO_TARGET_TMPDIR")).join("chain").join(effect),
@@ -49,13 +49,13 @@ impl Chain {
     }
 
     /// Runs a course on the bench with this model in the observer: the log, and what the observer left.
-    fn run(&self, course: &str, observer: &Path, out: &str) -> (PathBuf, f64) {
+    fn run(&self, course: &str, observer: &ModelFile, out: &str) -> (PathBuf, f64) {
         let file = root().join(format!("host-sim/virtual-bench/experiments/{course}.toml"));
         let request = Request {
             experiment: ExperimentFile::named_or_read(&file.to_string_lossy(), &[]).unwrap(),
             rig: RigFile::read(&self.rig, &[]).unwrap(),
             model: self.hidden.clone(),
-            observer: ModelFile::read(observer, &[]).unwrap(),
+            observer: observer.clone(),
             patch_observer: false,
             capture: false,
         };
@@ -83,12 +83,14 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-fn observer_falls_as_promised(effect: &'static str, parameters: &str) {
-    let chain = Chain::new(effect, parameters);
+fn observer_gains_what_the_diagnosis_does(effect: &'static str) {
+    let chain = Chain::new(effect);
     let [train, holdout] = [Path::new("--train"), Path::new("--holdout")];
-    let (first, _) = chain.run("train1", &chain.model, "train1");
-    let (second, _) = chain.run("train2", &chain.model, "train2");
-    let plain = chain.rig("fit", &[train, &first, &second]).join("model.toml");
+    let read = |path: &Path| ModelFile::read(path, &[]).unwrap();
+    let assumed = read(&chain.model);
+    let (first, _) = chain.run("train1", &assumed, "train1");
+    let (second, _) = chain.run("train2", &assumed, "train2");
+    let plain = read(&chain.rig("fit", &[train, &first, &second]).join("model.toml"));
     let (third, plain_left) = chain.run("holdout", &plain, "plain");
     let found = chain.rig("diagnose", &[train, &first, &second, holdout, &third]);
 
@@ -99,28 +101,36 @@ fn observer_falls_as_promised(effect: &'static str, parameters: &str) {
         diagnosis["causes"].as_array().unwrap().iter().map(|cause| &cause["id"]).collect();
     assert_eq!(causes, [effect]);
 
-    let (_, extended_left) = chain.run("holdout", &found.join("model-extended.toml"), "extended");
-    let promised = 1.0 - number(&diagnosis["extended"]["gain"]);
-    let kept = extended_left / plain_left;
+    let extended = read(&found.join("model-extended.toml"));
+    let (_, extended_left) = chain.run("holdout", &extended, "extended");
+    let (_, itself_left) = chain.run("holdout", &chain.hidden, "itself");
+    let diagnosed = 1.0 - number(&diagnosis["extended"]["gain"]);
+    let ratio = extended_left / plain_left;
     println!(
-        "{effect}: the observer on the chip leaves {:.2} % under the plain model and {:.2} % under the extended one; \
-         the diagnosis {:.2} % and {:.2} %, noise {:.2} %; ratios {kept:.3} and {promised:.3}",
+        "{effect}: the observer on the chip leaves {:.2} % under the plain model, {:.2} % under the extended one, {:.2} % under \
+         the rubber's own; the diagnosis {:.2} % and {:.2} %, noise {:.2} %; ratios {ratio:.3} and {diagnosed:.3}",
         100.0 * plain_left,
         100.0 * extended_left,
+        100.0 * itself_left,
         100.0 * number(&diagnosis["baseline"]["holdout_nrmse"]),
         100.0 * number(&diagnosis["extended"]["holdout_nrmse"]),
         100.0 * number(&diagnosis["extended"]["noise_floor_nrmse"]),
     );
     assert!(
-        kept <= MOST_OF_THE_PROMISED_RATIO * promised,
-        "{effect}: {kept} of what was left, {promised} promised"
+        ratio <= MOST_OF_THE_DIAGNOSIS * diagnosed
+            || extended_left <= MOST_OF_THE_RUBBER_ITSELF * itself_left,
+        "{effect}: on the chip {ratio} of what the plain model left, in the diagnosis {diagnosed}"
     );
+    // What is left in either case must be little against what was there, or nothing was shown.
+    assert!(extended_left < 0.5 * plain_left, "{effect}: {plain_left} and {extended_left}");
 }
 
 #[test]
-fn heat_that_nobody_told_of_is_found_in_the_benchs_logs_and_the_observer_gains_what_was_promised() {
-    observer_falls_as_promised(
-        "thermal_fade",
-        "fade_per_j = 0.002\ncooling_s = 4.0\nslow_fade_per_j = 0.0003\nslow_cooling_s = 40.0\nsaturation = 0.5\nexponent = 1.0\n",
-    );
+fn heat_that_nobody_told_of_is_found_in_the_benchs_logs_and_the_observer_gains_what_the_diagnosis_does() {
+    observer_gains_what_the_diagnosis_does("thermal_fade");
+}
+
+#[test]
+fn a_pattern_on_the_disc_is_found_in_the_benchs_logs_and_the_observer_gains_what_the_diagnosis_does() {
+    observer_gains_what_the_diagnosis_does("disc_angle");
 }
