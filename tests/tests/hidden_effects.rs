@@ -6,7 +6,7 @@
 use host_sim::diagnose::analysis::Role;
 use host_sim::diagnose::lines;
 use host_sim::diagnose::results::Diagnosis;
-use host_sim::diagnose::run::Case;
+use host_sim::diagnose::run::{Case, Outcome};
 use host_sim::files::log::Log;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
@@ -29,8 +29,14 @@ fn diagnose(scenario: &Scenario) -> Answer {
     };
     let case = Case::new(train, holdout, &rig, &model).unwrap();
     assert!(case.logs.iter().any(|(_, role)| *role == Role::Holdout));
-    let (judged, notes) = case.judge(&|_| ());
-    let diagnosis = Diagnosis::new(&judged, &lines::find(&case.logs), notes, String::new(), 0.0);
+    let Outcome { judged, notes, .. } = case.judge(&|_| ());
+    let diagnosis = Diagnosis::new(
+        &judged,
+        &lines::find(&case.logs, &lines::modes_hz(&judged)),
+        notes,
+        String::new(),
+        0.0,
+    );
     Answer::parse(&serde_json::to_string(&diagnosis).unwrap()).unwrap()
 }
 

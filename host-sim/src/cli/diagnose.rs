@@ -11,7 +11,7 @@ use crate::diagnose::lines;
 use crate::diagnose::next_experiment::{self, Bench};
 use crate::diagnose::page;
 use crate::diagnose::results::Diagnosis;
-use crate::diagnose::run::Case;
+use crate::diagnose::run::{Case, Outcome};
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::output_dir::OutputDir;
@@ -71,7 +71,7 @@ impl Diagnose {
             progress.say(&format!("fitting the {what}"));
             progress.advance(1);
         };
-        let (judged, notes) = case.judge(&told);
+        let Outcome { judged, notes, contact } = case.judge(&told);
         drop(progress);
         if judged.is_empty() {
             return Err(InputError::new(notes.join("; ")).key("--train"));
@@ -87,11 +87,11 @@ impl Diagnose {
         if let Some(text) = &next.file {
             output.write(next_experiment::FILE, text)?;
         }
-        let lines = lines::find(&case.logs);
+        let lines = lines::find(&case.logs, &lines::modes_hz(&judged));
         let wall_s = started.elapsed().as_secs_f64();
         let diagnosis = Diagnosis::new(&judged, &lines, notes, next.sentence, wall_s);
         output.write_json("diagnosis.json", &diagnosis)?;
-        output.write("model-extended.toml", extended_model::text(&judged, case.contact.as_deref())?)?;
+        output.write("model-extended.toml", extended_model::text(&judged, contact.as_deref())?)?;
         output.write("report.html", page::page(&diagnosis, &judged).to_html())?;
         let folder = output.folder().to_path_buf();
         output.finish()?;

@@ -8,7 +8,7 @@
 use super::runs::Runs;
 use crate::diagnose::page;
 use crate::diagnose::results::Diagnosis;
-use crate::diagnose::run::Case;
+use crate::diagnose::run::{Case, Outcome};
 use crate::files::log::Log;
 use crate::files::model_file::{ModelFile, ModelKind};
 use crate::files::rig_file::RigFile;
@@ -49,7 +49,7 @@ impl Story {
         let (holdout, train): (Vec<_>, Vec<_>) = logs.partition(|(name, _)| *name == HELD_OUT);
         let only = |logs: Vec<(&str, Log)>| logs.into_iter().map(|(_, log)| log).collect::<Vec<_>>();
         let case = Case::new(only(train), only(holdout), &rig, &baseline)?;
-        let (judged, notes) = case.judge(&|_| ());
+        let Outcome { judged, notes, .. } = case.judge(&|_| ());
         let diagnosis = Diagnosis::new(&judged, &[], notes, String::new(), 0.0);
         let lead = format!(
             "The logs of Figs. 18–21 (1 kHz; Fig. 19 held out) are given to rig diagnose with a LuGre model. {}",

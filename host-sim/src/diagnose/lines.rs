@@ -3,12 +3,14 @@
 //! What the rig does itself changes with its motion and load. A frequency at which a channel has power in every stretch of every log is none
 //! of its effects. The spectrum of stretches of `STRETCH_S` (Hann window, straight line taken off) is compared
 //! with that of its neighbours: the lower quartile over all stretches must stand out by `FACTOR`.
+//! Lines that the motion has too are a controller that hunts, and those at a known mode are its ringing.
 //! Left out: lines below `LOWEST_HZ`, where motion has power all the time, and those that come and go.
 
 use std::f64::consts::TAU;
 
 use super::analysis::Role;
 use super::coordinates::quantile;
+use super::verdict::Judged;
 use crate::files::log::Log;
 use crate::files::signal::Signal;
 
@@ -26,6 +28,11 @@ const FEWEST: usize = 8;
 /// Channels that are looked at.
 const CHANNELS: [Signal; 5] =
     [Signal::FrictionTorque, Signal::NormalForce, Signal::M2Torque, Signal::Force, Signal::M1Torque];
+
+/// What tells the motion, the first that is there.
+const MOTION: [Signal; 3] = [Signal::M2Speed, Signal::M2Angle, Signal::Position];
+/// A mode's neighbourhood, relative.
+const NEAR: f64 = 0.1;
 
 /// A line.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,12 +55,50 @@ impl SpectralLine {
     }
 }
 
-/// The strongest line of each channel in the training logs, where there is one.
-pub fn find(logs: &[(Log, Role)]) -> Vec<SpectralLine> {
-    CHANNELS.iter().filter_map(|channel| line_of(logs, *channel)).collect()
+/// The strongest line of each channel in the training logs, where there is one. `modes_hz` are resonances that
+/// are known: what rings there is no line.
+pub fn find(logs: &[(Log, Role)], modes_hz: &[f64]) -> Vec<SpectralLine> {
+    // What the motion shares is the rig's own swinging, a controller that hunts.
+    let motion = MOTION.iter().find_map(|signal| standing_out(logs, *signal));
+    CHANNELS.iter().filter_map(|channel| line_of(logs, *channel, modes_hz, motion.as_deref())).collect()
 }
 
-fn line_of(logs: &[(Log, Role)], channel: Signal) -> Option<SpectralLine> {
+/// Resonances that are among the causes named.
+pub fn modes_hz(judged: &[Judged]) -> Vec<f64> {
+    let of_part = |part: &Judged| -> Vec<f64> {
+        let Some(fit) = part.result() else { return Vec::new() };
+        let modes = [("ring_resonance", "mode_hz"), ("shaft_torsion", "natural_frequency_hz")];
+        let values = modes.into_iter().filter_map(|(id, name)| fit.get(Some(id), name));
+        values.map(|mode| mode.value).collect()
+    };
+    judged.iter().flat_map(of_part).collect()
+}
+
+fn line_of(
+    logs: &[(Log, Role)],
+    channel: Signal,
+    modes_hz: &[f64],
+    motion: Option<&[(f64, f64)]>,
+) -> Option<SpectralLine> {
+    let own = |k: usize| {
+        let near = |f: f64| (k as f64 / STRETCH_S - f).abs() < NEAR * f;
+        let moves = motion.is_some_and(|motion| {
+            motion[k.saturating_sub(1)..(k + 2).min(motion.len())].iter().any(|(over, _)| *over > FACTOR)
+        });
+        moves || modes_hz.iter().any(|f| near(*f))
+    };
+    let spectrum = standing_out(logs, channel)?;
+    let lines = spectrum.iter().enumerate().filter(|(k, (over, _))| *over > FACTOR && !own(*k));
+    let (k, (_, amplitude)) = lines.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    Some(SpectralLine {
+        channel: channel.column(),
+        frequency_hz: k as f64 / STRETCH_S,
+        amplitude: *amplitude,
+    })
+}
+
+/// At each whole number of periods in a stretch: by how much the power there stands out, and its amplitude.
+fn standing_out(logs: &[(Log, Role)], channel: Signal) -> Option<Vec<(f64, f64)>> {
     let mut powers: Vec<Vec<f64>> = Vec::new();
     for (log, _) in logs.iter().filter(|(_, role)| *role == Role::Train) {
         let (values, time) = (log.signal(channel)?, log.time_s());
@@ -72,25 +117,19 @@ fn line_of(logs: &[(Log, Role)], channel: Signal) -> Option<SpectralLine> {
     }
     let low: Vec<f64> =
         (0..bins).map(|k| quantile(&powers.iter().map(|p| p[k]).collect::<Vec<_>>(), 0.25)).collect();
-    let first = (LOWEST_HZ * STRETCH_S) as usize;
-    let mut best: Option<(f64, usize)> = None;
-    for k in first..bins.saturating_sub(NEIGHBOURS + 2) {
+    let looked_at = (LOWEST_HZ * STRETCH_S) as usize..bins.saturating_sub(NEIGHBOURS + 2);
+    let of = |k: usize| {
+        if !looked_at.contains(&k) {
+            return (0.0, 0.0);
+        }
         let around: Vec<f64> = (3..3 + NEIGHBOURS)
             .flat_map(|far| [k.checked_sub(far), Some(k + far)])
             .flatten()
             .filter_map(|i| low.get(i).copied())
             .collect();
-        let over = low[k] / quantile(&around, 0.75).max(f64::MIN_POSITIVE);
-        if over > FACTOR && best.is_none_or(|(known, _)| over > known) {
-            best = Some((over, k));
-        }
-    }
-    let (_, k) = best?;
-    Some(SpectralLine {
-        channel: channel.column(),
-        frequency_hz: k as f64 / STRETCH_S,
-        amplitude: low[k].sqrt(),
-    })
+        (low[k] / quantile(&around, 0.75).max(f64::MIN_POSITIVE), low[k].sqrt())
+    };
+    Some((0..bins).map(of).collect())
 }
 
 /// Squared amplitude of a sine at each whole number of periods in a stretch.
@@ -150,7 +189,7 @@ mod tests {
 
     #[test]
     fn hum_is_found_with_its_frequency_and_size_among_reversals_and_noise() {
-        let lines = find(&log(0.03));
+        let lines = find(&log(0.03), &[]);
         assert_eq!(lines.len(), 1);
         assert_eq!(lines[0].frequency_hz, 50.0);
         // Noise of 0.02 adds 0.001 to an amplitude over 1000 samples; reversals raise it in some stretches.
@@ -158,7 +197,16 @@ mod tests {
     }
 
     #[test]
+    fn a_known_mode_and_what_the_motion_shares_are_no_line() {
+        assert!(find(&log(0.03), &[51.0]).is_empty());
+        let mut hunting = log(0.03);
+        let swing = hunting[0].0.time_s().iter().map(|t| (TAU * 50.0 * t).sin()).collect();
+        hunting[0].0.set_signal(Signal::M2Speed, swing);
+        assert!(find(&hunting, &[]).is_empty());
+    }
+
+    #[test]
     fn reversals_and_noise_are_no_line() {
-        assert!(find(&log(0.0)).is_empty());
+        assert!(find(&log(0.0), &[]).is_empty());
     }
 }

@@ -10,6 +10,7 @@ pub mod contact;
 pub mod coordinates;
 pub mod drive;
 pub mod effects;
+pub mod events;
 pub mod extended_model;
 pub mod lines;
 pub mod next_experiment;

@@ -31,6 +31,19 @@ pub struct Case {
     pub analyses: Vec<Arc<dyn Analysis>>,
     /// The contact among them, which writes a model file.
     pub contact: Option<Arc<ContactAnalysis>>,
+    drive: Option<Arc<DriveAnalysis>>,
+    rig: RigFile,
+    model: ModelFile,
+}
+
+/// What a case came to.
+pub struct Outcome {
+    /// The subsystems.
+    pub judged: Vec<Judged>,
+    /// What was decided on the way.
+    pub notes: Vec<String>,
+    /// The contact as it was judged at last.
+    pub contact: Option<Arc<ContactAnalysis>>,
 }
 
 impl Case {
@@ -65,7 +78,15 @@ impl Case {
             logs.extend(train.into_iter().map(|log| (log, Role::Train)));
             logs.extend(holdout.into_iter().map(|log| (log, Role::Holdout)));
         }
-        let mut case = Self { logs, notes, analyses: Vec::new(), contact: None };
+        let mut case = Self {
+            logs,
+            notes,
+            analyses: Vec::new(),
+            contact: None,
+            drive: None,
+            rig: rig.clone(),
+            model: model.clone(),
+        };
         case.analyse(kind, rig, model)?;
         Ok(case)
     }
@@ -76,30 +97,75 @@ impl Case {
     }
 
     /// Fits, compares and judges; subsystems that cannot be fitted become notes.
-    pub fn judge(&self, told: &(dyn Fn(&str) + Sync)) -> (Vec<Judged>, Vec<String>) {
+    pub fn judge(&self, told: &(dyn Fn(&str) + Sync)) -> Outcome {
         let coordinates: Vec<Coordinates> = self.logs.iter().map(|(log, _)| Coordinates::new(log)).collect();
-        let (mut judged, mut notes): (Vec<Judged>, Vec<String>) = (Vec::new(), self.notes.clone());
+        let mut outcome =
+            Outcome { judged: Vec::new(), notes: self.notes.clone(), contact: self.contact.clone() };
+        let mut drive = self.drive.clone();
         for analysis in &self.analyses {
             let mut analysis = analysis.clone();
             if analysis.subsystem() == Subsystem::Drive
-                && let Some(corrected) = judged.first().and_then(|contact| self.drive_behind(contact))
+                && let Some(corrected) = outcome.judged.first().and_then(|contact| self.drive_behind(contact))
             {
-                notes.push(
+                outcome.notes.push(
                     "drive: the friction torque was corrected for what the friction channel adds".into(),
                 );
+                drive = Some(corrected.clone());
                 analysis = corrected;
             }
             match select(analysis.as_ref(), told) {
-                Ok(selection) => judged.push(judge(analysis, selection, &coordinates)),
-                Err(why) => notes.push(format!("{}: not analysed: {why}", analysis.subsystem().name())),
+                Ok(selection) => outcome.judged.push(judge(analysis, selection, &coordinates)),
+                Err(why) => {
+                    outcome.notes.push(format!("{}: not analysed: {why}", analysis.subsystem().name()));
+                }
             }
         }
-        notes.extend(settle(&mut judged, self.contact.as_deref()));
-        (judged, notes)
+        let mut repaired = None;
+        if let Some(drive) = drive
+            && let Some(contact) = self.contact_on_the_disc(&outcome.judged, &drive)
+            && let Ok(selection) = select(contact.as_ref(), told)
+            && let Some(first) = outcome.judged.first_mut()
+        {
+            outcome.notes.push(
+                "friction: the disc's angle was corrected for what the drive puts between disc and encoder"
+                    .into(),
+            );
+            repaired = Some(first.structured_before());
+            *first = judge(contact.clone(), selection, &coordinates);
+            outcome.contact = Some(contact);
+        }
+        let notes = settle(&mut outcome.judged, outcome.contact.as_deref(), repaired);
+        outcome.notes.extend(notes);
+        outcome
+    }
+
+    /// The contact under the disc's own motion, where the drive is known to take disc and encoder apart.
+    fn contact_on_the_disc(&self, judged: &[Judged], drive: &DriveAnalysis) -> Option<Arc<ContactAnalysis>> {
+        self.contact.as_ref()?;
+        let part = judged.iter().find(|part| part.analysis.subsystem() == Subsystem::Drive)?;
+        let offsets = match part.verdict {
+            Verdict::Named => drive.disc_offsets(&part.selection.chosen)?,
+            _ => return None,
+        };
+        let mut logs = self.logs.clone();
+        for ((log, _), offset) in logs.iter_mut().zip(&offsets) {
+            let start_s = log.time_s().first().copied().unwrap_or(0.0);
+            let times: Vec<f64> = log.time_s().iter().map(|t| t - start_s).collect();
+            for (signal, values) in
+                [(Signal::M2Angle, &offset.angle_rad), (Signal::M2Speed, &offset.speed_rad_s)]
+            {
+                let Some(shown) = log.signal(signal) else { continue };
+                let more = interpolate(&offset.time_s, values, &times);
+                let own = shown.iter().zip(&more).map(|(shown, more)| shown + more).collect();
+                log.set_signal(signal, own);
+            }
+        }
+        let logs: Vec<(&Log, Role)> = logs.iter().map(|(log, role)| (log, *role)).collect();
+        ContactAnalysis::new(&self.rig, &self.model, &logs).ok().map(Arc::new)
     }
 
     /// The drive under the friction torque itself, where the channel that measures it is known to be wrong.
-    fn drive_behind(&self, contact: &Judged) -> Option<Arc<dyn Analysis>> {
+    fn drive_behind(&self, contact: &Judged) -> Option<Arc<DriveAnalysis>> {
         let analysis = self.contact.as_ref()?;
         let measured = |cause: &&'static str| subsystem_of(cause) == Some(Subsystem::Measurement);
         if contact.verdict != Verdict::Named || !contact.selection.chosen.iter().any(measured) {
@@ -116,7 +182,7 @@ impl Case {
             log.set_signal(Signal::FrictionTorque, torque);
         }
         let logs: Vec<(&Log, Role)> = logs.iter().map(|(log, role)| (log, *role)).collect();
-        DriveAnalysis::new(&logs).ok().map(|drive| Arc::new(drive) as Arc<dyn Analysis>)
+        DriveAnalysis::new(&logs).ok().map(Arc::new)
     }
 
     fn analyse(&mut self, kind: LogKind, rig: &RigFile, model: &ModelFile) -> Result<(), InputError> {
@@ -134,7 +200,11 @@ impl Case {
         }
         if kind != LogKind::Contact || logs.iter().all(|(log, _)| log.drive().is_ok()) {
             match DriveAnalysis::new(&logs) {
-                Ok(drive) => self.analyses.push(Arc::new(drive)),
+                Ok(drive) => {
+                    let drive = Arc::new(drive);
+                    self.analyses.push(drive.clone());
+                    self.drive = Some(drive);
+                }
                 Err(why) => notes.push(format!("drive: not analysed: {why}")),
             }
         }

@@ -27,6 +27,15 @@ impl Independent {
         Self { counts }
     }
 
+    /// As if nothing were left but noise: what could be seen at best.
+    pub fn at_most(fit: &Fit, role: Role) -> Self {
+        let counts = channels(fit, role)
+            .iter()
+            .map(|channel| (channel.name, channel.count() as f64 / channel.samples_per_noise()))
+            .collect();
+        Self { counts }
+    }
+
     fn of_channel(&self, name: &str) -> f64 {
         self.counts.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, count)| *count)
     }

@@ -31,7 +31,11 @@ pub fn estimated_gain(fit: &Fit, alone: &Fit, effect: &str, independent: &Indepe
                 .chain(&baseline)
                 .map(|&p| alone.sensitivity.get(p).filter(|column| column.len() == now.residual.len()))
                 .collect();
-            known |= columns[..own.len()].iter().any(Option::is_some);
+            // A size that lies on its bound alone moves nothing there, and may do so beside others.
+            let moves = |column: &Option<&Vec<f64>>| {
+                column.is_some_and(|c| c.iter().any(|x| x.is_finite() && *x != 0.0))
+            };
+            known |= columns[..own.len()].iter().any(moves);
             for (i, r) in now.residual.iter().enumerate().filter(|(_, r)| r.is_finite()) {
                 residual.push(r / level);
                 let value = |column: &Option<&Vec<f64>>| column.map_or(0.0, |c| c[i] / level);

@@ -2,7 +2,8 @@
 //!
 //! Stepwise: each round adds each candidate to each of the best combinations so far (`BEAM` of them, so
 //! that a strong rival cannot hide a pair), fits, and scores on the training logs ([`super::score`]). A
-//! round counts if its best gains more than its price and is material. Then every effect is taken out once
+//! round counts if its best gains more than its price and is material; where the first does not, a second one
+//! looks for pairs. Then every effect is taken out once
 //! again; one that is not missed goes. What is left must also lower the error on the held-out logs, which
 //! nothing was fitted to.
 
@@ -11,6 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::analysis::{Analysis, Fit, Role};
+use super::pooled::channels;
 use super::score::{EFFECT_PRICE, Independent, Score, likelihood_ratio, score};
 use super::screening::estimated_gain;
 
@@ -29,12 +31,16 @@ const MATERIAL_SHARE: f64 = 0.05;
 const IMPERFECT_SHARE: f64 = 0.01;
 /// Estimated gain in log-likelihood below which an effect is not tried beside others.
 const LEAST_ESTIMATE: f64 = 3.0;
-/// Effects tried beside others, those with the largest estimates.
-const MOST_TRIED: usize = 6;
+/// Effects tried beside others, those with the largest estimates …
+const MOST_TRIED: usize = 4;
+/// … and where much is left, since the estimates are then those of another shape.
+const MOST_TRIED_IN_ERROR: usize = 9;
 /// Share of the training gain per sample that an effect must show on held-out logs, where its gain there is
 /// not worth the effect's price by itself.
 const CONFIRMED_SHARE: f64 = 0.2;
 
+/// Mean square, in variances of the noise, that is taken for noise.
+const NOISE_LEVEL: f64 = 2.0;
 /// Growth of the held-out error at which an effect does harm there, whatever single samples gain.
 const HARM: f64 = 1.02;
 
@@ -115,7 +121,7 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
     let mut beam: Vec<Combination> = vec![Vec::new()];
     for _ in 0..MOST_EFFECTS {
         let wanted: Vec<(Combination, Combination)> =
-            beam.iter().flat_map(|set| search.worthwhile(set, &candidates, &independent)).collect();
+            beam.iter().flat_map(|set| search.worthwhile(set, &candidates)).collect();
         search.fit_all(&wanted);
         let tried = || wanted.iter().map(|(set, _)| set).filter(|set| search.fits.contains_key(*set));
         // The independent values are those that the best fit leaves.
@@ -138,7 +144,15 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
         let (before, top) = (rated(&best), rated(&set));
         let material = is_material(&base, &search.fits[&best], &search.fits[&set], &independent);
         if top.penalised <= before.penalised || !material {
-            break;
+            // Two that hide each other gain nothing alone: with each of them the other's error is left, slow
+            // and so worth few values.
+            let looks_ahead = best.is_empty() && beam == [Combination::new()] && !is_noise(&base);
+            if !looks_ahead {
+                break;
+            }
+            ranked.sort_by(|a, b| b.1.likelihood.total_cmp(&a.1.likelihood));
+            beam = ranked.into_iter().take(BEAM).map(|(set, _)| set).collect();
+            continue;
         }
         best = set;
         let floor = before.likelihood + BEAM_SHARE * (top.likelihood - before.likelihood);
@@ -156,6 +170,11 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
     Ok(selection)
 }
 
+/// Whether a fit leaves so little of the subsystem's own signal that no search for hidden pairs is worth its time.
+fn is_noise(fit: &Fit) -> bool {
+    channels(fit, Role::Train).first().is_none_or(|channel| channel.mean_square() < NOISE_LEVEL)
+}
+
 /// Whether what a step gains in the subsystem's own signal is more than imperfection, of the noise or of the effects that are in already.
 pub(super) fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Independent) -> bool {
     let fall = |from, to| likelihood_ratio(from, to, Role::Train, independent).1;
@@ -165,27 +184,24 @@ pub(super) fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Indepe
 
 impl Search<'_> {
     /// A combination with each candidate that may gain something beside it, and where its fit starts.
-    fn worthwhile(
-        &self,
-        set: &Combination,
-        candidates: &[&'static str],
-        independent: &Independent,
-    ) -> Vec<(Combination, Combination)> {
+    fn worthwhile(&self, set: &Combination, candidates: &[&'static str]) -> Vec<(Combination, Combination)> {
         let fit = &self.fits[set];
+        // A structured rest holds few independent values, and yet may be just what one more effect explains.
+        let independent = Independent::at_most(fit, Role::Train);
         let mut rated: Vec<(f64, &'static str)> = candidates
             .iter()
             .filter(|id| !set.contains(id) && !self.failed.contains_key(&vec![**id]))
             .filter(|id| !set.iter().any(|known| exclude_each_other(known, id)))
             .map(|id| {
                 let alone = self.fits.get(&vec![*id]).filter(|_| !set.is_empty());
-                let gain = alone.and_then(|alone| estimated_gain(fit, alone, id, independent));
+                let gain = alone.and_then(|alone| estimated_gain(fit, alone, id, &independent));
                 (gain.unwrap_or(f64::INFINITY), *id)
             })
             .filter(|(gain, _)| *gain > LEAST_ESTIMATE)
             .collect();
         rated.sort_by(|a, b| b.0.total_cmp(&a.0));
         if !set.is_empty() {
-            rated.truncate(MOST_TRIED);
+            rated.truncate(if is_noise(fit) { MOST_TRIED } else { MOST_TRIED_IN_ERROR });
         }
         rated.into_iter().map(|(_, id)| (sorted(&[set.as_slice(), &[id]].concat()), set.clone())).collect()
     }

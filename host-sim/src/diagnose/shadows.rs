@@ -11,9 +11,12 @@ use super::contact::ContactAnalysis;
 use super::record::Measured;
 use super::verdict::{Cause, Judged, Verdict};
 use crate::files::effect_id::{Subsystem, subsystem_of};
+use crate::files::signal::Signal;
 
 /// Fewest clipped samples in the training logs.
 const FEWEST_CLIPPED: usize = 20;
+/// Share of the residual that a correction of the motion may leave over.
+const LEFT_OVER: f64 = 0.25;
 /// Effects of the contact that a moving disc behind a soft shaft looks like.
 const LIKE_A_SHAFT: [&str; 6] = [
     "element_compliance",
@@ -28,10 +31,19 @@ const LIKE_A_SHAFT: [&str; 6] = [
 const LIKE_A_LATE_LOAD: [&str; 4] = ["presliding", "shaft_torsion", "backlash", "bearing_stribeck"];
 
 /// Names clipped channels and silences what stands in another fault's shadow; gives a note for each.
-pub fn settle(judged: &mut [Judged], contact: Option<&ContactAnalysis>) -> Vec<String> {
-    if let Some(contact) = contact {
-        name_clipping(judged, contact);
-    }
+///
+/// `unrepaired` is the structured part of the contact's residual before the disc's motion was corrected for
+/// what the drive puts between it and the encoder, where it was.
+pub fn settle(
+    judged: &mut [Judged],
+    contact: Option<&ContactAnalysis>,
+    unrepaired: Option<f64>,
+) -> Vec<String> {
+    let clipped = contact.and_then(|contact| name_clipping(judged, contact));
+    let drifting_load = judged.iter().any(|part| {
+        let fit = part.selection.extended();
+        fit.is_some_and(|fit| fit.get(Some("bridge_drift"), "normal_gain").is_some())
+    });
     let named: Vec<(Subsystem, &'static str)> = judged
         .iter()
         .flat_map(|part| part.causes.iter().map(|cause| (part.analysis.subsystem(), cause.id)))
@@ -40,10 +52,13 @@ pub fn settle(judged: &mut [Judged], contact: Option<&ContactAnalysis>) -> Vec<S
     for part in judged.iter_mut().filter(|part| part.verdict != Verdict::None) {
         let own = part.analysis.subsystem();
         let only = |ids: &[&str]| part.causes.iter().all(|cause| ids.contains(&cause.id));
+        // What a correction of the motion has taken away was the drive's; a small rest is what it left over.
+        let left_over = unrepaired.is_none_or(|before| part.structured_before() < LEFT_OVER * before);
         let shadow = named.iter().filter(|(from, _)| *from != own).find(|(_, id)| match (own, *id) {
-            (Subsystem::Friction, "encoder_eccentricity") => only(&["disc_angle"]),
-            (Subsystem::Friction, "shaft_torsion" | "backlash") => only(&LIKE_A_SHAFT),
-            (Subsystem::Pressure, "bridge_drift" | "adc_saturation") => true,
+            (Subsystem::Friction, "encoder_eccentricity") => left_over && only(&["disc_angle"]),
+            (Subsystem::Friction, "shaft_torsion" | "backlash") => left_over && only(&LIKE_A_SHAFT),
+            (Subsystem::Pressure, "bridge_drift") => drifting_load || part.verdict == Verdict::Unknown,
+            (Subsystem::Pressure, "adc_saturation") => clipped == Some(Signal::NormalForce),
             // A load that comes at the wrong moment is wrong where it changes: at reversals and steps.
             (Subsystem::Drive, "friction_delay" | "ring_resonance") => {
                 part.verdict == Verdict::Unknown || only(&LIKE_A_LATE_LOAD)
@@ -63,19 +78,24 @@ pub fn settle(judged: &mut [Judged], contact: Option<&ContactAnalysis>) -> Vec<S
     notes
 }
 
-fn name_clipping(judged: &mut [Judged], contact: &ContactAnalysis) {
-    let Some(part) = judged.iter_mut().find(|part| part.analysis.subsystem() == Subsystem::Friction) else {
-        return;
-    };
+/// Names a channel that clips; gives which one it is.
+fn name_clipping(judged: &mut [Judged], contact: &ContactAnalysis) -> Option<Signal> {
+    let part = judged.iter_mut().find(|part| part.analysis.subsystem() == Subsystem::Friction)?;
     let train = || contact.records().iter().filter(|record| record.role == Role::Train);
     let count = |channel: &Measured| (0..channel.values.len()).filter(|i| channel.clipped(*i)).count();
     let friction: usize = train().map(|record| count(&record.friction_nm)).sum();
     let normal: usize = train().map(|record| count(&record.normal_n)).sum();
-    let known = part.causes.iter().any(|cause| cause.id == "adc_saturation");
-    if friction.max(normal) < FEWEST_CLIPPED || known {
-        return;
+    if friction.max(normal) < FEWEST_CLIPPED {
+        return None;
     }
-    let (name, samples) = if friction > normal { ("friction", friction) } else { ("normal force", normal) };
+    let (channel, name, samples) = if friction > normal {
+        (Signal::FrictionTorque, "friction", friction)
+    } else {
+        (Signal::NormalForce, "normal force", normal)
+    };
+    if part.causes.iter().any(|cause| cause.id == "adc_saturation") {
+        return Some(channel);
+    }
     let evidence = vec![format!(
         "the {name} channel shows exactly its extreme value in {samples} samples of the training logs, in runs too long for its noise"
     )];
@@ -83,6 +103,7 @@ fn name_clipping(judged: &mut [Judged], contact: &ContactAnalysis) {
     // It is seen, not inferred: it stands first.
     let weight = part.causes.iter().map(|cause| cause.weight).fold(samples as f64, f64::max);
     part.causes.insert(0, Cause { id: "adc_saturation", probability: 0.99, weight, evidence });
+    Some(channel)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! `none`: no effect earns its price and the baseline's residual is noise, or so little that no real model
 //! would do better. `named`: the chosen effects explain the structured part of the residual. `unknown`: it is structured and nothing
 //! explains it, or what is left after the best explanation is still more than `LEFT_SHARE` of it: then a nearest name would
-//! be a wrong one.
+//! be a wrong one. What is left is judged without its worst moments ([`super::events`]).
 //!
 //! Probabilities: each chosen effect against each rival in its place and against nothing in its place, by the
 //! differences of the penalised scores, which count independent values as the chosen fit leaves them.
@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use super::analysis::{Analysis, Fit, Role};
 use super::coordinates::Coordinates;
+use super::events::Moments;
 use super::score::{Independent, Score, likelihood_ratio};
 use super::selection::{MOST_EFFECTS, Selection, is_material, without};
 use super::structure::{Structure, structures};
@@ -112,10 +113,18 @@ pub fn judge(analysis: Arc<dyn Analysis>, selection: Selection, coordinates: &[C
     let before = tested(selection.baseline());
     let after = if selection.chosen.is_empty() { before.clone() } else { tested(selection.extended()) };
     // Only the subsystem's own signal: other witnesses may carry what is another subsystem's.
-    let left = before.iter().zip(&after).take(1).any(|(before, after)| {
-        after.is_material()
-            && (selection.chosen.is_empty() || after.structured > LEFT_SHARE * before.structured)
-    });
+    let left = match (selection.baseline(), selection.extended()) {
+        (Some(base), Some(full)) => {
+            // What is left must be there without its worst moments.
+            let moments = Moments::of(full, Role::Train);
+            let calm = |fit: &Fit| structures(&moments.taken_from(fit), Role::Train, coordinates);
+            calm(base).iter().zip(&calm(full)).take(1).any(|(before, after)| {
+                after.is_material()
+                    && (selection.chosen.is_empty() || after.structured > LEFT_SHARE * before.structured)
+            })
+        }
+        _ => false,
+    };
     let wrong = before.iter().take(1).any(Structure::is_material);
     let verdict = match (wrong, left, selection.chosen.is_empty()) {
         // What is significant and yet below any real model's imperfection is not worth a name.

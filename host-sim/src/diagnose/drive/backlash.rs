@@ -46,10 +46,21 @@ impl Prepared for DeadZone {
     }
 
     fn regressors(&self, shape: &[f64], seen: &Seen<'_>) -> Vec<Regressor> {
+        let name = Units::of(seen.log.motion).inertia("disc_inertia");
+        vec![Regressor { name, values: self.shaft(shape).follow(seen.log).torque_per_inertia }]
+    }
+
+    fn disc_offset(&self, shape: &[f64], _sizes: &[f64], seen: &Seen<'_>) -> Option<Vec<f64>> {
+        Some(self.shaft(shape).follow(seen.log).offset)
+    }
+}
+
+impl DeadZone {
+    fn shaft(&self, shape: &[f64]) -> Shaft {
         let (gap, depth, exponent) = (shape[0], shape[1], shape[2]);
         let per_inertia = shape[4] / self.slow.inertia;
         let slope = self.typical / depth;
-        let shaft = Shaft {
+        Shaft {
             spring: Spring::Flanks {
                 half_gap: 0.5 * gap,
                 factor: self.typical / depth.powf(exponent),
@@ -61,9 +72,7 @@ impl Prepared for DeadZone {
             coulomb: self.slow.coulomb * per_inertia,
             viscous: self.slow.viscous * per_inertia,
             per_inertia: disc_per_inertia(shape.get(5), self.slow.inertia),
-        };
-        let name = Units::of(seen.log.motion).inertia("disc_inertia");
-        vec![Regressor { name, values: shaft.torque_per_inertia(seen.log) }]
+        }
     }
 }
 

@@ -80,6 +80,12 @@ pub trait Prepared: Send + Sync {
     /// Regressors on a log.
     fn regressors(&self, shape: &[f64], seen: &Seen<'_>) -> Vec<Regressor>;
 
+    /// Where the disc is against the encoder's angle, on a log: for an effect that takes them apart. `sizes`
+    /// are the coefficients of [`Self::regressors`].
+    fn disc_offset(&self, _shape: &[f64], _sizes: &[f64], _seen: &Seen<'_>) -> Option<Vec<f64>> {
+        None
+    }
+
     /// What was fixed when the effect was set up and belongs to it in a model file.
     fn constants(&self) -> Vec<(String, f64)> {
         Vec::new()

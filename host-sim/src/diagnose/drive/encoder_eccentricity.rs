@@ -56,6 +56,20 @@ impl Prepared for RunOut {
         WAVES.iter().zip(&NAMES).flat_map(of_wave).collect()
     }
 
+    fn disc_offset(&self, _shape: &[f64], sizes: &[f64], seen: &Seen<'_>) -> Option<Vec<f64>> {
+        let at = |q: &f64| {
+            WAVES
+                .iter()
+                .zip(sizes.chunks_exact(2))
+                .map(|(wave, size)| {
+                    let (sin, cos) = (wave * (q - seen.origin)).sin_cos();
+                    size[0] * cos + size[1] * sin
+                })
+                .sum()
+        };
+        Some(seen.log.position.iter().map(at).collect())
+    }
+
     fn origins(&self) -> Option<Origins<'_>> {
         let span = 2.0 * std::f64::consts::PI;
         Some(Origins { span, step: STEP_RAD, starts: &self.starts, waves: &WAVES })

@@ -41,6 +41,7 @@ use super::analysis::{Analysis, Fit, Role};
 use super::selection::sorted;
 use crate::files::effect_id::Subsystem;
 use crate::files::log::Log;
+use crate::fit::drive::record::central_difference;
 
 /// The effects that show in the drive, in the order of the contract.
 static EFFECTS: [&dyn DriveEffect; 9] = [
@@ -169,6 +170,41 @@ impl DriveAnalysis {
             .collect();
         let effects = effects.to_vec();
         Known { slow: slow::fit(&self.train(), &solved.sizes.values), residual, effects }
+    }
+}
+
+/// Where the disc is against the encoder's angle in a log.
+pub struct DiscOffset {
+    /// Time since the log's start, s.
+    pub time_s: Vec<f64>,
+    /// Angle of the disc less the measured one, rad.
+    pub angle_rad: Vec<f64>,
+    /// Its rate, rad/s.
+    pub speed_rad_s: Vec<f64>,
+}
+
+impl DriveAnalysis {
+    /// Where the disc is against the encoder's angle, in each log; `None` where no effect takes them apart.
+    pub fn disc_offsets(&self, effects: &[&'static str]) -> Option<Vec<DiscOffset>> {
+        let solved = self.solve(effects, effects).ok()?;
+        let model = Model { logs: &self.logs, parts: &solved.parts };
+        let mut any = false;
+        let offsets = (0..self.logs.len()).map(|index| {
+            let log = &self.logs[index].log;
+            let mut angle_rad = vec![0.0; log.len()];
+            for offset in model.disc_offsets(&solved.shapes, &solved.names, &solved.sizes, index) {
+                any = true;
+                angle_rad.iter_mut().zip(offset).for_each(|(sum, x)| *sum += x);
+            }
+            let step_s = log.record.step_s;
+            DiscOffset {
+                time_s: (0..log.len()).map(|i| step_s * i as f64).collect(),
+                speed_rad_s: central_difference(&angle_rad, step_s),
+                angle_rad,
+            }
+        });
+        let offsets: Vec<DiscOffset> = offsets.collect();
+        any.then_some(offsets)
     }
 }
 

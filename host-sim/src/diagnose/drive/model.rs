@@ -169,6 +169,24 @@ impl Model<'_> {
         all
     }
 
+    /// Offsets of the disc against the encoder in a log, of each part that has one.
+    pub fn disc_offsets(
+        &self,
+        shapes: &Shapes,
+        names: &[ColumnName],
+        sizes: &Sizes,
+        index: usize,
+    ) -> Vec<Vec<f64>> {
+        let log = &self.logs[index].log;
+        let seen = Seen { log, direction: &log.direction, origin: shapes.origins[index] };
+        let of_part = |(i, part): (usize, &Part)| {
+            let columns = names.iter().zip(&sizes.values).filter(|(name, _)| name.effect == Some(part.id));
+            let own: Vec<f64> = columns.map(|(_, size)| *size).collect();
+            part.prepared.disc_offset(self.shapes_of(i, shapes), &own, &seen)
+        };
+        self.parts.iter().enumerate().filter_map(of_part).collect()
+    }
+
     /// Names of the columns: those of [`Self::regressors`], then timing.
     pub fn names(&self, shapes: &Shapes) -> Vec<ColumnName> {
         let log = &self.logs[0].log;

@@ -53,6 +53,15 @@ pub struct Shaft {
     pub per_inertia: f64,
 }
 
+/// What the disc does behind the shaft, at each sample of a log.
+#[derive(Debug, Clone, Default)]
+pub struct Behind {
+    /// The shaft's torque less the measured friction, over the disc's inertia.
+    pub torque_per_inertia: Vec<f64>,
+    /// Angle of the disc less that of the motor.
+    pub offset: Vec<f64>,
+}
+
 /// Steps are at most this share of 1/ω.
 const STEP_SHARE: f64 = 0.25;
 
@@ -99,22 +108,23 @@ impl Spring {
 }
 
 impl Shaft {
-    /// The shaft's torque less the measured friction over the disc's inertia, at each sample.
-    pub fn torque_per_inertia(&self, log: &DriveLog) -> Vec<f64> {
+    /// What the disc does when the motor moves as in a log.
+    pub fn follow(&self, log: &DriveLog) -> Behind {
         let step_s = log.record.step_s;
         let rate = self.spring.steepest().sqrt().max(self.damping);
         let splits = (rate * step_s / STEP_SHARE).ceil().clamp(1.0, MOST_STEPS);
         let h = step_s / splits;
         let gap = self.spring.has_gap();
         let (Some(&first), Some(&speed)) = (log.position.first(), log.speed.first()) else {
-            return Vec::new();
+            return Behind::default();
         };
         let rubbing = log.contact.as_ref().map(|contact| contact.friction.as_slice());
         // Settled under the friction at the first sample.
         let load = rubbing.map_or(0.0, |friction| self.per_inertia * friction[0]);
         let (mut x, mut v) = (first - self.spring.strain_of(load), speed);
         let mut torque = vec![0.0; log.len()];
-        for (i, torque) in torque.iter_mut().enumerate().skip(1) {
+        let mut offset = vec![x - first; log.len()];
+        for i in 1..log.len() {
             let (p0, p1) = (log.position[i - 1], log.position[i]);
             let (s0, s1) = (log.speed[i - 1], log.speed[i]);
             // Cubic through both ends' positions and speeds.
@@ -141,9 +151,10 @@ impl Shaft {
                 x += h * v;
             }
             // The measured friction is taken off the effort elsewhere.
-            *torque = w - rubbing.map_or(0.0, |friction| self.per_inertia * friction[i]);
+            torque[i] = w - rubbing.map_or(0.0, |friction| self.per_inertia * friction[i]);
+            offset[i] = x - p1;
         }
-        torque
+        Behind { torque_per_inertia: torque, offset }
     }
 }
 

@@ -41,17 +41,26 @@ impl Prepared for TwoMasses {
     }
 
     fn regressors(&self, shape: &[f64], seen: &Seen<'_>) -> Vec<Regressor> {
+        let name = Units::of(seen.log.motion).inertia("disc_inertia");
+        vec![Regressor { name, values: self.shaft(shape).follow(seen.log).torque_per_inertia }]
+    }
+
+    fn disc_offset(&self, shape: &[f64], _sizes: &[f64], seen: &Seen<'_>) -> Option<Vec<f64>> {
+        Some(self.shaft(shape).follow(seen.log).offset)
+    }
+}
+
+impl TwoMasses {
+    fn shaft(&self, shape: &[f64]) -> Shaft {
         let omega = 2.0 * std::f64::consts::PI * shape[0];
         let stiffness = omega * omega;
-        let shaft = Shaft {
+        Shaft {
             spring: Spring::Shaft { stiffness, hardening: shape[3] / (self.typical / stiffness).powi(2) },
             damping: 2.0 * shape[1] * omega,
             coulomb: shape[2] * self.coulomb,
             viscous: shape[2] * self.viscous,
             per_inertia: disc_per_inertia(shape.get(4), self.inertia),
-        };
-        let name = Units::of(seen.log.motion).inertia("disc_inertia");
-        vec![Regressor { name, values: shaft.torque_per_inertia(seen.log) }]
+        }
     }
 }
 
