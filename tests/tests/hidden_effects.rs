@@ -76,6 +76,22 @@ fn a_clean_contact_log_raises_no_alarm() {
 }
 
 #[test]
+fn one_breakaway_a_moment_too_early_raises_no_alarm() {
+    // Three windows of a quarter second hold nine tenths of this log's residual.
+    is_named(&Scenario::new(&[], 1012));
+}
+
+#[test]
+fn causes_in_two_subsystems_are_named_together() {
+    is_named(&Scenario::new(&[Effect::FoilHardening, Effect::BridgeDrift], 12005));
+}
+
+#[test]
+fn behind_a_soft_shaft_the_contact_is_judged_by_the_discs_own_motion() {
+    is_named(&Scenario::new(&[Effect::ShaftTorsion, Effect::ThermalFade], 12008));
+}
+
+#[test]
 fn a_rhythm_that_is_not_in_the_library_is_unknown() {
     is_named(&Scenario::new(&[Effect::MuBreathing], 4));
 }

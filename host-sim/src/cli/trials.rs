@@ -14,6 +14,7 @@ use crate::input_error::InputError;
 Examples:
   rig trials --seeds 2
   rig trials --seeds 5 --effects thermal_fade wear_drift
+  rig trials --effects thermal_fade+m2_ripple
   rig trials --seeds 3 --pairs --noise 3
 
 Needs cargo and the project's sources: the generators are a program of their own. rig trials --list shows all

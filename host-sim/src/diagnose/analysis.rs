@@ -20,6 +20,11 @@ pub trait Analysis: Sync {
     /// another subsystem of the contract: the encoder's eccentricity shows in the drive.
     fn candidates(&self) -> Vec<&'static str>;
 
+    /// Effects that the logs show by themselves, without a fit: the search begins with them.
+    fn seen(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
+
     /// Fits baseline and effects together to the training logs and evaluates all logs. `near` is a fit
     /// with fewer effects to start from.
     ///

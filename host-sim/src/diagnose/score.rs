@@ -67,6 +67,8 @@ pub fn likelihood_ratio(base: &Fit, fit: &Fit, role: Role, independent: &Indepen
         if count == 0 || from <= 0.0 {
             continue;
         }
+        // A witness that noise explains has nothing more to say.
+        let (from, to) = if index == 0 { (from, to) } else { (from.max(1.0), to.max(1.0)) };
         // Residuals below a millionth of their start are not told apart: rounding.
         let ratio = (to / from).max(1e-6);
         likelihood -= 0.5 * independent.of_channel(before.name) * ratio.ln();

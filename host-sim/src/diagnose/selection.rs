@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::analysis::{Analysis, Fit, Role};
 use super::pooled::channels;
-use super::score::{EFFECT_PRICE, Independent, Score, likelihood_ratio, score};
+use super::score::{Independent, Score, likelihood_ratio, score};
 use super::screening::estimated_gain;
 
 /// Combinations that go on into the next round.
@@ -33,14 +33,13 @@ const IMPERFECT_SHARE: f64 = 0.01;
 const LEAST_ESTIMATE: f64 = 3.0;
 /// Effects tried beside others, those with the largest estimates …
 const MOST_TRIED: usize = 4;
-/// … and where much is left, since the estimates are then those of another shape.
+/// … and where the best of the first round leaves much, since the estimates are then those of another shape.
 const MOST_TRIED_IN_ERROR: usize = 9;
-/// Share of the training gain per sample that an effect must show on held-out logs, where its gain there is
-/// not worth the effect's price by itself.
+/// Share of the training logs' gain per value that an effect must show on held-out logs.
 const CONFIRMED_SHARE: f64 = 0.2;
 
 /// Mean square, in variances of the noise, that is taken for noise.
-const NOISE_LEVEL: f64 = 2.0;
+const NOISE_LEVEL: f64 = 3.0;
 /// Growth of the held-out error at which an effect does harm there, whatever single samples gain.
 const HARM: f64 = 1.02;
 
@@ -117,11 +116,15 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
     search.fits.insert(Vec::new(), base.clone());
     let candidates = analysis.candidates();
     let mut independent = Independent::of(&base, Role::Train);
-    let mut best: Combination = Vec::new();
-    let mut beam: Vec<Combination> = vec![Vec::new()];
-    for _ in 0..MOST_EFFECTS {
-        let wanted: Vec<(Combination, Combination)> =
-            beam.iter().flat_map(|set| search.worthwhile(set, &candidates)).collect();
+    let seen = sorted(&analysis.seen());
+    search.fit_all(&[(seen.clone(), Vec::new())]);
+    let mut best: Combination = if search.fits.contains_key(&seen) { seen } else { Vec::new() };
+    let first = best.clone();
+    let mut beam: Vec<Combination> = vec![best.clone()];
+    for round in 0..MOST_EFFECTS {
+        let wanted: Vec<(Combination, Combination)> = (0..beam.len())
+            .flat_map(|at| search.worthwhile(&beam[at], &candidates, at == 0 && round <= 1))
+            .collect();
         search.fit_all(&wanted);
         let tried = || wanted.iter().map(|(set, _)| set).filter(|set| search.fits.contains_key(*set));
         // The independent values are those that the best fit leaves.
@@ -146,7 +149,7 @@ pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<S
         if top.penalised <= before.penalised || !material {
             // Two that hide each other gain nothing alone: with each of them the other's error is left, slow
             // and so worth few values.
-            let looks_ahead = best.is_empty() && beam == [Combination::new()] && !is_noise(&base);
+            let looks_ahead = beam == [first.clone()] && !is_noise(&search.fits[&first]);
             if !looks_ahead {
                 break;
             }
@@ -184,7 +187,12 @@ pub(super) fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Indepe
 
 impl Search<'_> {
     /// A combination with each candidate that may gain something beside it, and where its fit starts.
-    fn worthwhile(&self, set: &Combination, candidates: &[&'static str]) -> Vec<(Combination, Combination)> {
+    fn worthwhile(
+        &self,
+        set: &Combination,
+        candidates: &[&'static str],
+        widely: bool,
+    ) -> Vec<(Combination, Combination)> {
         let fit = &self.fits[set];
         // A structured rest holds few independent values, and yet may be just what one more effect explains.
         let independent = Independent::at_most(fit, Role::Train);
@@ -201,7 +209,7 @@ impl Search<'_> {
             .collect();
         rated.sort_by(|a, b| b.0.total_cmp(&a.0));
         if !set.is_empty() {
-            rated.truncate(if is_noise(fit) { MOST_TRIED } else { MOST_TRIED_IN_ERROR });
+            rated.truncate(if is_noise(fit) || !widely { MOST_TRIED } else { MOST_TRIED_IN_ERROR });
         }
         rated.into_iter().map(|(_, id)| (sorted(&[set.as_slice(), &[id]].concat()), set.clone())).collect()
     }
@@ -267,17 +275,16 @@ impl Search<'_> {
             self.fit_again(&fewer, best);
             let full = self.fits[best].clone();
             *independent = Independent::of(&full, Role::Train);
-            let held_out = Independent::of(&full, Role::Holdout);
+            let has_holdout = channels(&full, Role::Holdout).iter().any(|channel| channel.count() > 0);
             let whole = score(&base, &full, independent);
             let mut weakest: Option<(f64, &'static str, bool)> = None;
             for effect in best.iter().copied() {
                 let Some(less) = self.fits.get(&without(best, effect)) else { continue };
                 let missed = whole.penalised - score(&base, less, independent).penalised;
                 let (trained, _) = likelihood_ratio(less, &full, Role::Train, independent);
-                let (held, _) = likelihood_ratio(less, &full, Role::Holdout, &held_out);
-                let per_value = trained / independent.total().max(1.0);
-                let has_holdout = held_out.total() > 0.0;
-                let seen = held / held_out.total() >= CONFIRMED_SHARE * per_value || held > EFFECT_PRICE;
+                // Weighed as on the training logs: what one rest there hides from one channel must not decide.
+                let (held, _) = likelihood_ratio(less, &full, Role::Holdout, independent);
+                let seen = held >= CONFIRMED_SHARE * trained;
                 let harms = less.nrmse(Role::Holdout).zip(full.nrmse(Role::Holdout));
                 let harms = harms.is_some_and(|(less, full)| full > HARM * less);
                 let confirmed = !has_holdout || (seen && !harms);

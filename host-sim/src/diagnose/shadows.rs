@@ -6,15 +6,11 @@
 //! another diagnosis, with the fault repaired. A channel that clips is named from the channel itself ([`super::saturation`]):
 //! fits leave its samples out.
 
-use super::analysis::Role;
 use super::contact::ContactAnalysis;
-use super::record::Measured;
 use super::verdict::{Cause, Judged, Verdict};
 use crate::files::effect_id::{Subsystem, subsystem_of};
 use crate::files::signal::Signal;
 
-/// Fewest clipped samples in the training logs.
-const FEWEST_CLIPPED: usize = 20;
 /// Share of the residual that a correction of the motion may leave over.
 const LEFT_OVER: f64 = 0.25;
 /// Effects of the contact that a moving disc behind a soft shaft looks like.
@@ -81,18 +77,8 @@ pub fn settle(
 /// Names a channel that clips; gives which one it is.
 fn name_clipping(judged: &mut [Judged], contact: &ContactAnalysis) -> Option<Signal> {
     let part = judged.iter_mut().find(|part| part.analysis.subsystem() == Subsystem::Friction)?;
-    let train = || contact.records().iter().filter(|record| record.role == Role::Train);
-    let count = |channel: &Measured| (0..channel.values.len()).filter(|i| channel.clipped(*i)).count();
-    let friction: usize = train().map(|record| count(&record.friction_nm)).sum();
-    let normal: usize = train().map(|record| count(&record.normal_n)).sum();
-    if friction.max(normal) < FEWEST_CLIPPED {
-        return None;
-    }
-    let (channel, name, samples) = if friction > normal {
-        (Signal::FrictionTorque, "friction", friction)
-    } else {
-        (Signal::NormalForce, "normal force", normal)
-    };
+    let (channel, samples) = contact.clipped()?;
+    let name = if channel == Signal::FrictionTorque { "friction" } else { "normal force" };
     if part.causes.iter().any(|cause| cause.id == "adc_saturation") {
         return Some(channel);
     }

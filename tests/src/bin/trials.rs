@@ -18,6 +18,7 @@ use rig_tests::{Base, Effect, Form, Scenario, generate};
 Examples:
   rig trials --seeds 2
   rig trials --seeds 5 --effects thermal_fade wear_drift
+  rig trials --effects thermal_fade+m2_ripple
   rig trials --seeds 3 --pairs --noise 3
 
 Without --effects, --pairs, --outside and --none all of them are tried."
@@ -29,7 +30,7 @@ struct Arguments {
     /// First seed
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// Only these effects
+    /// Only these effects; some at once are joined by +, as thermal_fade+m2_ripple
     #[arg(long, value_name = "ID", num_args = 1..)]
     effects: Vec<String>,
     /// Two effects at once: so many random pairs for each seed
@@ -128,12 +129,14 @@ fn cases(arguments: &Arguments) -> Result<Vec<(Vec<Effect>, u64)>, String> {
     if all {
         hidden.extend(Effect::known().into_iter().filter(fits).map(|effect| vec![effect]));
     }
-    for id in &arguments.effects {
-        let effect = Effect::from_id(id).ok_or_else(|| {
-            let ids: Vec<&str> = Effect::ALL.iter().map(|e| e.id()).collect();
-            format!("--effects: {id}: unknown; allowed: {}", ids.join(", "))
-        })?;
-        hidden.push(vec![effect]);
+    for ids in &arguments.effects {
+        let known = |id: &str| {
+            Effect::from_id(id).ok_or_else(|| {
+                let ids: Vec<&str> = Effect::ALL.iter().map(|e| e.id()).collect();
+                format!("--effects: {id}: unknown; allowed, alone or joined by +: {}", ids.join(", "))
+            })
+        };
+        hidden.push(ids.split('+').map(known).collect::<Result<_, _>>()?);
     }
     if all || arguments.outside {
         hidden.extend(Effect::outside().into_iter().filter(fits).map(|effect| vec![effect]));

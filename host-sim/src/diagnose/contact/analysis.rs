@@ -15,12 +15,16 @@ use super::output;
 use super::problem::{Combination, Fitted, Problem};
 use crate::diagnose::analysis::{Analysis, Fit, Role};
 use crate::diagnose::effects;
-use crate::diagnose::record::Record;
+use crate::diagnose::record::{Measured, Record};
 use crate::files::effect_id::{Subsystem, subsystem_of};
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
+use crate::files::signal::Signal;
 use crate::input_error::InputError;
+
+/// Fewest samples of a channel that clips.
+const FEWEST_CLIPPED: usize = 20;
 
 /// Times and values.
 pub type Series = (Vec<f64>, Vec<f64>);
@@ -53,6 +57,20 @@ impl ContactAnalysis {
     /// The prepared records, training first.
     pub fn records(&self) -> &[Record] {
         &self.problem.records
+    }
+
+    /// The channel that clips in the training logs, the one that does so more, and how many samples do.
+    pub fn clipped(&self) -> Option<(Signal, usize)> {
+        let train = || self.records().iter().filter(|record| record.role == Role::Train);
+        let count = |channel: &Measured| (0..channel.values.len()).filter(|i| channel.clipped(*i)).count();
+        let friction: usize = train().map(|record| count(&record.friction_nm)).sum();
+        let normal: usize = train().map(|record| count(&record.normal_n)).sum();
+        let (channel, samples) = if friction > normal {
+            (Signal::FrictionTorque, friction)
+        } else {
+            (Signal::NormalForce, normal)
+        };
+        (samples >= FEWEST_CLIPPED).then_some((channel, samples))
     }
 
     /// The fitted model as a file: refitted baseline, its intervals, and an extension for each effect.
@@ -147,6 +165,10 @@ impl Analysis for ContactAnalysis {
 
     fn candidates(&self) -> Vec<&'static str> {
         self.problem.conceivable().into_iter().map(|effect| effect.id()).collect()
+    }
+
+    fn seen(&self) -> Vec<&'static str> {
+        self.clipped().map_or(Vec::new(), |_| vec!["adc_saturation"])
     }
 
     fn fit(&self, effects: &[&'static str], near: Option<&Fit>) -> Result<Fit, String> {

@@ -120,6 +120,22 @@ mod tests {
     use crate::fit::drive::record::DriveRecord;
 
     #[test]
+    fn the_discs_offset_takes_the_error_away() {
+        let step_s = 1e-3;
+        let (shown, origin, [cos, sin]) = (|t: f64| 4.0 * t, 0.7, [0.03, -0.02]);
+        let position: Vec<f64> = (0..4000).map(|i| shown(step_s * f64::from(i))).collect();
+        let record = DriveRecord { start_s: 0.0, step_s, effort: vec![0.0; 4000], position };
+        let log = DriveLog::from_record(record, None, Motion::Rotary, Role::Train);
+        let run_out = RunOut { slow: Slow { inertia: 0.02, viscous: 0.0, coulomb: 0.1 }, starts: vec![0.0] };
+        let seen = Seen { log: &log, direction: &log.direction, origin };
+        let offset = run_out.disc_offset(&[], &[cos, sin, 0.0, 0.0], &seen).unwrap();
+        for i in (200..3800).step_by(211) {
+            let phase = shown(step_s * i as f64) - origin;
+            assert!((offset[i] - cos * phase.cos() - sin * phase.sin()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
     fn the_torque_of_the_error_is_that_of_its_derivatives() {
         let step_s = 1e-3;
         let angle = |t: f64| 3.0 * t + 2.0 * (1.3 * t).sin();
