@@ -94,6 +94,7 @@ fn name_clipping(judged: &mut [Judged], contact: &ContactAnalysis) -> Option<Sig
 
 #[cfg(test)]
 mod tests {
+    use super::super::structure::Structure;
     use super::super::synthetic::{contact_of, said, sliding_log};
     use super::*;
     use crate::files::log::Log;
@@ -111,7 +112,7 @@ mod tests {
     }
 
     fn settled(judged: &mut [Judged], contact: Option<&ContactAnalysis>) -> Vec<String> {
-        settle(judged, contact)
+        settle(judged, contact, None)
     }
 
     /// The first is taken for a shadow of the second, which stays.
@@ -168,6 +169,26 @@ mod tests {
             stays(named(Friction, &["element_compliance", "wear_drift"]), named(Drive, shaft));
             stays(named(Pressure, &["foil_hardening"]), named(Drive, shaft));
         }
+    }
+
+    #[test]
+    fn what_is_large_even_under_the_discs_own_motion_is_the_contacts() {
+        let settled_after = |unrepaired: f64| {
+            let mut contact = named(Friction, &["element_compliance"]);
+            contact.before = vec![Structure {
+                channel: "friction torque",
+                mean_square: 101.0,
+                structured: 100.0,
+                nrmse: 0.1,
+                deviations: 50.0,
+                views: Vec::new(),
+            }];
+            let mut judged = [contact, named(Drive, &["shaft_torsion"])];
+            settle(&mut judged, None, Some(unrepaired));
+            judged[0].verdict
+        };
+        assert_eq!(settled_after(150.0), Verdict::Named);
+        assert_eq!(settled_after(1000.0), Verdict::None);
     }
 
     #[test]
