@@ -31,7 +31,8 @@ is held out, the last part of each training log is.
 
 Writes diagnosis.json (verdict named, none or unknown; causes with probabilities, parameters and evidence;
 rejected rivals with reasons; errors on the held-out logs against the noise), model-extended.toml,
-next-experiment.toml (for contact logs) and report.html (opens in any browser, needs no network).")]
+next-experiment.toml (for contact logs; where two causes of the contact stay open, the experiment on which their
+fitted models differ most) and report.html (opens in any browser, needs no network).")]
 pub(super) struct Diagnose {
     /// Rig file (TOML); the assumed rig where left out
     #[arg(long, value_name = "RIG.toml")]
@@ -76,7 +77,7 @@ impl Diagnose {
         if judged.is_empty() {
             return Err(InputError::new(notes.join("; ")).key("--train"));
         }
-        let bench = case.contact.as_deref().map(|contact| Bench { rig: &rig, model: &model, contact });
+        let bench = contact.as_deref().map(|contact| Bench { rig: &rig, model: &model, contact });
         let progress = Mutex::new(Progress::new("trying experiments", 1));
         let next = next_experiment::propose(&judged, bench, |done, total| {
             let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);

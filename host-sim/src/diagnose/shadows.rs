@@ -251,6 +251,13 @@ mod tests {
     }
 
     #[test]
+    fn a_clipped_friction_channel_says_nothing_about_the_press() {
+        let mut judged = [said(Friction, Verdict::None, &[]), named(Pressure, &["lever_hysteresis"])];
+        let notes = settled_with(&sliding_log(Some((Signal::FrictionTorque, 2.5))), &mut judged);
+        assert_eq!((judged[1].verdict, notes.len()), (Verdict::Named, 0));
+    }
+
+    #[test]
     fn whole_channels_and_clips_of_held_out_logs_are_not_named() {
         let mut judged = [said(Friction, Verdict::None, &[])];
         settled_with(&sliding_log(None), &mut judged);
