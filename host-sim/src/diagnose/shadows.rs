@@ -40,12 +40,17 @@ pub fn settle(
         let fit = part.selection.extended();
         fit.is_some_and(|fit| fit.get(Some("bridge_drift"), "normal_gain").is_some())
     });
-    let named: Vec<(Subsystem, &'static str)> = judged
+    let mut named: Vec<(Subsystem, &'static str)> = judged
         .iter()
         .flat_map(|part| part.causes.iter().map(|cause| (part.analysis.subsystem(), cause.id)))
         .collect();
     let mut notes = Vec::new();
-    for part in judged.iter_mut().filter(|part| part.verdict != Verdict::None) {
+    // The strongest last: two that look like each other must not silence each other.
+    let strength = |part: &Judged| part.causes.iter().map(|cause| cause.weight).fold(0.0, f64::max);
+    let mut parts: Vec<&mut Judged> =
+        judged.iter_mut().filter(|part| part.verdict != Verdict::None).collect();
+    parts.sort_by(|a, b| strength(a).total_cmp(&strength(b)));
+    for part in parts {
         let own = part.analysis.subsystem();
         let only = |ids: &[&str]| part.causes.iter().all(|cause| ids.contains(&cause.id));
         // What a correction of the motion has taken away was the drive's; a small rest is what it left over.
@@ -64,7 +69,8 @@ pub fn settle(
             }
             _ => false,
         });
-        if let Some((_, id)) = shadow {
+        if let Some((_, id)) = shadow.copied() {
+            named.retain(|(from, _)| *from != own);
             notes.push(format!("{}: what is left is taken for the shadow of {id}", own.name()));
             part.verdict = Verdict::None;
             part.causes.clear();
@@ -201,6 +207,18 @@ mod tests {
             stays(named(Drive, &["m2_ripple"]), named(Friction, channel));
             stays(named(Drive, &["presliding", "m2_ripple"]), named(Friction, channel));
             stays(named(Pressure, &["lever_hysteresis"]), named(Friction, channel));
+        }
+    }
+
+    #[test]
+    fn of_two_that_look_like_each_other_the_stronger_stays() {
+        for stronger in [0, 1] {
+            let mut judged = [named(Friction, &["friction_delay"]), named(Drive, &["shaft_torsion"])];
+            judged[stronger].causes[0].weight = 500.0;
+            let notes = settled(&mut judged, None);
+            assert_eq!(notes.len(), 1);
+            assert_eq!(judged[stronger].verdict, Verdict::Named);
+            assert_eq!(judged[1 - stronger].verdict, Verdict::None);
         }
     }
 
