@@ -7,6 +7,7 @@
 
 use super::analysis::{Fit, Role};
 use super::pooled::{channels, common_losses};
+use super::structure::TOLERATED_LEVEL;
 
 /// Price of an effect beside its parameters, in units of log-likelihood: a level of e⁻⁶ for each.
 pub const EFFECT_PRICE: f64 = 6.0;
@@ -67,8 +68,10 @@ pub fn likelihood_ratio(base: &Fit, fit: &Fit, role: Role, independent: &Indepen
         if count == 0 || from <= 0.0 {
             continue;
         }
-        // A witness that noise explains has nothing more to say.
-        let (from, to) = if index == 0 { (from, to) } else { (from.max(1.0), to.max(1.0)) };
+        // A witness that noise nearly explains has nothing more to say: it would outvote, by its many independent
+        // values, a signal that is far from explained.
+        let (from, to) =
+            if index == 0 { (from, to) } else { (from.max(TOLERATED_LEVEL), to.max(TOLERATED_LEVEL)) };
         // Residuals below a millionth of their start are not told apart: rounding.
         let ratio = (to / from).max(1e-6);
         likelihood -= 0.5 * independent.of_channel(before.name) * ratio.ln();
@@ -110,6 +113,24 @@ mod tests {
         // The loss is the square only nearly.
         assert!((score.likelihood - expected).abs() < 0.06 * expected);
         assert!((score.share - 0.75).abs() < 0.03);
+    }
+
+    #[test]
+    fn a_witness_within_noise_has_no_vote_and_one_far_above_has() {
+        let with_witness = |level: f64| {
+            let mut fit = fit_of(white(4000, 7));
+            let mut witness = fit.logs[0].channels[0].clone();
+            witness.name = "witness";
+            witness.residual.iter_mut().for_each(|r| *r *= level);
+            fit.logs[0].channels.push(witness);
+            fit
+        };
+        let gain = |from: f64, to: f64| {
+            let (base, fit) = (with_witness(from), with_witness(to));
+            likelihood_ratio(&base, &fit, Role::Train, &Independent::of(&fit, Role::Train)).0
+        };
+        assert_eq!(gain(1.3, 0.5), 0.0);
+        assert!(gain(5.0, 1.0) > 1000.0);
     }
 
     #[test]

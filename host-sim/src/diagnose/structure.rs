@@ -21,7 +21,7 @@ const LEVEL: f64 = 5.0;
 /// Structured variance that is tolerated, in units of the noise's variance.
 pub const TOLERATED_VARIANCE: f64 = 0.8;
 /// Mean square that a noise level estimated too low may give.
-const TOLERATED_LEVEL: f64 = 2.0;
+pub const TOLERATED_LEVEL: f64 = 2.0;
 /// Structured error that is tolerated, relative to the signal's RMS.
 pub const TOLERATED_NRMSE: f64 = 2e-3;
 

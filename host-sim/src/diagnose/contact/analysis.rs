@@ -8,6 +8,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use model_core::extension::Extension;
 use rayon::prelude::*;
 
 use super::evidence;
@@ -23,6 +24,8 @@ use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::input_error::InputError;
 
+/// Rates of a drift that are of the friction bridge: the first ones.
+const FRICTION_RATES: usize = 2;
 /// Fewest samples of a channel that clips.
 const FEWEST_CLIPPED: usize = 20;
 
@@ -88,7 +91,11 @@ impl ContactAnalysis {
             let mut model = self.problem.model_with(&fitted, log, self.problem.origin(&fitted, log));
             let shown = self.problem.run_samples(&model, log)?.shown_nm;
             let of_contact = |id| subsystem_of(id) != Some(Subsystem::Measurement);
-            model.effects.retain(|(extension, _)| of_contact(extension.id()));
+            model.effects.retain(|(e, _)| of_contact(e.id()) || *e == Extension::BridgeDrift);
+            // A drift of the normal bridge is in the load, not in what the friction channel adds.
+            for (_, rates) in model.effects.iter_mut().filter(|(e, _)| *e == Extension::BridgeDrift) {
+                rates[..FRICTION_RATES].fill(0.0);
+            }
             let plain = self.problem.run_samples(&model, log)?.shown_nm;
             let excess = shown.iter().zip(&plain).map(|(a, b)| a - b).collect();
             Ok((self.problem.records[log].time_s.clone(), excess))

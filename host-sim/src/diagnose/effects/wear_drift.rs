@@ -19,7 +19,7 @@ impl ContactEffect for WearDrift {
         vec![
             // Relative change after the longest distance of a record.
             Parameter::linear("change_over_record", 0.0, -0.9, 4.0),
-            Parameter::logarithmic("scale_m", distance_m, 0.02 * distance_m, 20.0 * distance_m),
+            Parameter::logarithmic("scale_m", distance_m, 0.02 * distance_m, (1e3 * distance_m).min(1e6)),
         ]
     }
 
