@@ -28,6 +28,7 @@ pub mod search;
 pub mod selection;
 pub mod shadows;
 pub mod smooth;
+mod stepwise;
 pub mod structure;
 #[cfg(test)]
 mod synthetic;

@@ -1,47 +1,21 @@
 //! Which effects, of all that a subsystem's library has, the logs ask for.
 //!
-//! Stepwise: each round adds each candidate to each of the best combinations so far (`BEAM` of them, so
-//! that a strong rival cannot hide a pair), fits, and scores on the training logs ([`super::score`]). A
-//! round counts if its best gains more than its price and is material; where the first does not, a second one
-//! looks for pairs. Then every effect is taken out once
-//! again; one that is not missed goes. What is left must also lower the error on the held-out logs, which
-//! nothing was fitted to.
+//! Found by adding and taking out one at a time ([`super::stepwise`]), by scores on the training logs
+//! ([`super::score`]). What is chosen must also lower the error on the held-out logs, which nothing was
+//! fitted to.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::analysis::{Analysis, Fit, Role};
-use super::pooled::channels;
 use super::score::{Independent, Score, likelihood_ratio, score};
-use super::screening::estimated_gain;
+use super::stepwise::Search;
 
-/// Combinations that go on into the next round.
-const BEAM: usize = 2;
-/// Most effects of one subsystem at once.
-pub(super) const MOST_EFFECTS: usize = 3;
-/// Threads that fit.
-const THREADS: usize = 2;
-/// A rival that scores within this share of the best one's likelihood gain goes into the beam.
-const BEAM_SHARE: f64 = 0.7;
 /// An effect must lower the mean square of the subsystem's own signal by this much: below, it is significant only
 /// because there are many samples.
 const MATERIAL_SHARE: f64 = 0.05;
 /// The same, of the baseline's mean square: what is less may be what the laws of the other effects get wrong.
 const IMPERFECT_SHARE: f64 = 0.01;
-/// Estimated gain in log-likelihood below which an effect is not tried beside others.
-const LEAST_ESTIMATE: f64 = 3.0;
-/// Effects tried beside others, those with the largest estimates …
-const MOST_TRIED: usize = 4;
-/// … and where the best of the first round leaves much, since the estimates are then those of another shape.
-const MOST_TRIED_IN_ERROR: usize = 9;
-/// Share of the training logs' gain per value that an effect must show on held-out logs.
-const CONFIRMED_SHARE: f64 = 0.2;
-
-/// Mean square, in variances of the noise, that is taken for noise.
-const NOISE_LEVEL: f64 = 3.0;
-/// Growth of the held-out error at which an effect does harm there, whatever single samples gain.
-const HARM: f64 = 1.02;
 
 /// A combination of effects, sorted.
 pub type Combination = Vec<&'static str>;
@@ -94,88 +68,17 @@ pub fn without(effects: &[&'static str], effect: &str) -> Combination {
     effects.iter().copied().filter(|id| *id != effect).collect()
 }
 
-/// Play sits in a soft shaft: one name holds both.
-fn exclude_each_other(a: &str, b: &str) -> bool {
-    matches!((a, b), ("shaft_torsion", "backlash") | ("backlash", "shaft_torsion"))
-}
-
-struct Search<'a> {
-    analysis: &'a dyn Analysis,
-    told: &'a (dyn Fn(&str) + Sync),
-    fits: BTreeMap<Combination, Arc<Fit>>,
-    failed: BTreeMap<Combination, String>,
-}
-
 /// Chooses the effects of a subsystem. `told` hears of every fit.
 ///
 /// The error says why not even the baseline can be fitted.
 pub fn select(analysis: &dyn Analysis, told: &(dyn Fn(&str) + Sync)) -> Result<Selection, String> {
-    let base = Arc::new(analysis.fit(&[], None)?);
-    told(analysis.subsystem().name());
-    let mut search = Search { analysis, told, fits: BTreeMap::new(), failed: BTreeMap::new() };
-    search.fits.insert(Vec::new(), base.clone());
-    let candidates = analysis.candidates();
-    let mut independent = Independent::of(&base, Role::Train);
-    let seen = sorted(&analysis.seen());
-    search.fit_all(&[(seen.clone(), Vec::new())]);
-    let mut best: Combination = if search.fits.contains_key(&seen) { seen } else { Vec::new() };
-    let first = best.clone();
-    let mut beam: Vec<Combination> = vec![best.clone()];
-    for round in 0..MOST_EFFECTS {
-        let wanted: Vec<(Combination, Combination)> = (0..beam.len())
-            .flat_map(|at| search.worthwhile(&beam[at], &candidates, at == 0 && round <= 1))
-            .collect();
-        search.fit_all(&wanted);
-        let tried = || wanted.iter().map(|(set, _)| set).filter(|set| search.fits.contains_key(*set));
-        // The independent values are those that the best fit leaves.
-        let most = tried().max_by(|a, b| {
-            let value =
-                |set: &Combination| likelihood_ratio(&base, &search.fits[set], Role::Train, &independent).0;
-            value(a).total_cmp(&value(b))
-        });
-        if let Some(most) = most {
-            independent = Independent::of(&search.fits[most], Role::Train);
-        }
-        let rated = |set: &Combination| score(&base, &search.fits[set], &independent);
-        let mut ranked: Vec<(Combination, Score)> = tried().map(|set| (set.clone(), rated(set))).collect();
-        ranked.sort_by(|a, b| b.1.penalised.total_cmp(&a.1.penalised));
-        ranked.dedup_by(|a, b| a.0 == b.0);
-        let Some((set, _)) = ranked.first().cloned() else { break };
-        // A search that ended early would leave something to be found for any other effect.
-        search.fit_again(std::slice::from_ref(&set), &set);
-        let rated = |set: &Combination| score(&base, &search.fits[set], &independent);
-        let (before, top) = (rated(&best), rated(&set));
-        let material = is_material(&base, &search.fits[&best], &search.fits[&set], &independent);
-        if top.penalised <= before.penalised || !material {
-            // Two that hide each other gain nothing alone: with each of them the other's error is left, slow
-            // and so worth few values.
-            let looks_ahead = beam == [first.clone()] && !is_noise(&search.fits[&first]);
-            if !looks_ahead {
-                break;
-            }
-            ranked.sort_by(|a, b| b.1.likelihood.total_cmp(&a.1.likelihood));
-            beam = ranked.into_iter().take(BEAM).map(|(set, _)| set).collect();
-            continue;
-        }
-        best = set;
-        let floor = before.likelihood + BEAM_SHARE * (top.likelihood - before.likelihood);
-        beam = ranked
-            .into_iter()
-            .filter(|(_, s)| s.likelihood >= floor)
-            .take(BEAM)
-            .map(|(set, _)| set)
-            .collect();
-    }
-    let unconfirmed = search.eliminate(&mut best, &mut independent);
+    let mut search = Search::new(analysis, told)?;
+    let most = search.forward();
+    let (chosen, unconfirmed, independent) = search.backward(most);
     let mut selection =
-        Selection { fits: search.fits, failed: search.failed, chosen: best, unconfirmed, independent };
+        Selection { fits: search.fits, failed: search.failed, chosen, unconfirmed, independent };
     selection.order();
     Ok(selection)
-}
-
-/// Whether a fit leaves so little of the subsystem's own signal that no search for hidden pairs is worth its time.
-fn is_noise(fit: &Fit) -> bool {
-    channels(fit, Role::Train).first().is_none_or(|channel| channel.mean_square() < NOISE_LEVEL)
 }
 
 /// Whether what a step gains in the subsystem's own signal is more than imperfection, of the noise or of the effects that are in already.
@@ -183,123 +86,6 @@ pub(super) fn is_material(base: &Fit, from: &Fit, to: &Fit, independent: &Indepe
     let fall = |from, to| likelihood_ratio(from, to, Role::Train, independent).1;
     let of_baseline = fall(base, to) - fall(base, from);
     fall(from, to) > MATERIAL_SHARE && of_baseline > IMPERFECT_SHARE
-}
-
-impl Search<'_> {
-    /// A combination with each candidate that may gain something beside it, and where its fit starts.
-    fn worthwhile(
-        &self,
-        set: &Combination,
-        candidates: &[&'static str],
-        widely: bool,
-    ) -> Vec<(Combination, Combination)> {
-        let fit = &self.fits[set];
-        // A structured rest holds few independent values, and yet may be just what one more effect explains.
-        let independent = Independent::at_most(fit, Role::Train);
-        let mut rated: Vec<(f64, &'static str)> = candidates
-            .iter()
-            .filter(|id| !set.contains(id) && !self.failed.contains_key(&vec![**id]))
-            .filter(|id| !set.iter().any(|known| exclude_each_other(known, id)))
-            .map(|id| {
-                let alone = self.fits.get(&vec![*id]).filter(|_| !set.is_empty());
-                let gain = alone.and_then(|alone| estimated_gain(fit, alone, id, &independent));
-                (gain.unwrap_or(f64::INFINITY), *id)
-            })
-            .filter(|(gain, _)| *gain > LEAST_ESTIMATE)
-            .collect();
-        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
-        if !set.is_empty() {
-            rated.truncate(if is_noise(fit) || !widely { MOST_TRIED } else { MOST_TRIED_IN_ERROR });
-        }
-        rated.into_iter().map(|(_, id)| (sorted(&[set.as_slice(), &[id]].concat()), set.clone())).collect()
-    }
-
-    /// Fits combinations again from one with more effects, and keeps what is better: a search that ended too early alone may not
-    /// have done so there.
-    fn fit_again(&mut self, sets: &[Combination], from: &Combination) {
-        let near = self.fits[from].clone();
-        for set in sets {
-            if let Ok(fit) = self.analysis.fit(set, Some(&near)) {
-                (self.told)(self.analysis.subsystem().name());
-                let better = self.fits.get(set).is_none_or(|known| {
-                    let independent = Independent::of(known, Role::Train);
-                    likelihood_ratio(known, &fit, Role::Train, &independent).0 > 0.0
-                });
-                if better {
-                    self.fits.insert(set.clone(), Arc::new(fit));
-                }
-            }
-        }
-    }
-
-    /// Fits what is not known yet, some at a time.
-    fn fit_all(&mut self, wanted: &[(Combination, Combination)]) {
-        let mut todo: Vec<&(Combination, Combination)> = wanted
-            .iter()
-            .filter(|(set, _)| !self.fits.contains_key(set) && !self.failed.contains_key(set))
-            .collect();
-        todo.dedup_by(|a, b| a.0 == b.0);
-        let next = AtomicUsize::new(0);
-        let done: Mutex<Vec<(Combination, Result<Fit, String>)>> = Mutex::new(Vec::new());
-        let work = || {
-            while let Some((set, near)) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let fit = self.analysis.fit(set, self.fits.get(near).map(Arc::as_ref));
-                (self.told)(self.analysis.subsystem().name());
-                done.lock().unwrap_or_else(PoisonError::into_inner).push((set.clone(), fit));
-            }
-        };
-        std::thread::scope(|scope| {
-            for _ in 1..THREADS {
-                scope.spawn(work);
-            }
-            work();
-        });
-        for (set, fit) in done.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            match fit {
-                Ok(fit) => {
-                    self.fits.insert(set, Arc::new(fit));
-                }
-                Err(why) => {
-                    self.failed.insert(set, why);
-                }
-            }
-        }
-    }
-
-    /// Takes out what is not missed, on the training logs or on the held-out ones; gives the latter.
-    fn eliminate(&mut self, best: &mut Combination, independent: &mut Independent) -> Vec<&'static str> {
-        let base = self.fits[&Vec::new()].clone();
-        let mut unconfirmed = Vec::new();
-        loop {
-            let fewer: Vec<Combination> = best.iter().map(|effect| without(best, effect)).collect();
-            self.fit_again(&fewer, best);
-            let full = self.fits[best].clone();
-            *independent = Independent::of(&full, Role::Train);
-            let has_holdout = channels(&full, Role::Holdout).iter().any(|channel| channel.count() > 0);
-            let whole = score(&base, &full, independent);
-            let mut weakest: Option<(f64, &'static str, bool)> = None;
-            for effect in best.iter().copied() {
-                let Some(less) = self.fits.get(&without(best, effect)) else { continue };
-                let missed = whole.penalised - score(&base, less, independent).penalised;
-                let (trained, _) = likelihood_ratio(less, &full, Role::Train, independent);
-                // Weighed as on the training logs: what one rest there hides from one channel must not decide.
-                let (held, _) = likelihood_ratio(less, &full, Role::Holdout, independent);
-                let seen = held >= CONFIRMED_SHARE * trained;
-                let harms = less.nrmse(Role::Holdout).zip(full.nrmse(Role::Holdout));
-                let harms = harms.is_some_and(|(less, full)| full > HARM * less);
-                let confirmed = !has_holdout || (seen && !harms);
-                let wanted = missed > 0.0 && is_material(&base, less, &full, independent);
-                if !(wanted && confirmed) && weakest.is_none_or(|(least, ..)| missed < least) {
-                    weakest = Some((missed, effect, wanted));
-                }
-            }
-            let Some((_, effect, on_training)) = weakest else { return unconfirmed };
-            if on_training {
-                unconfirmed.push(effect);
-            }
-            *best = without(best, effect);
-        }
-    }
 }
 
 impl Selection {

@@ -14,7 +14,8 @@ use super::analysis::{Analysis, Fit, Role};
 use super::coordinates::Coordinates;
 use super::events::Moments;
 use super::score::{Independent, Score, likelihood_ratio};
-use super::selection::{MOST_EFFECTS, Selection, is_material, without};
+use super::selection::{Selection, is_material, without};
+use super::stepwise::MOST_EFFECTS;
 use super::structure::{Structure, structures};
 
 /// Structured rest that an explanation may leave, of what the baseline leaves.
