@@ -48,11 +48,13 @@ pub(super) struct Waves {
     pub unexplained: f64,
     /// Two effects that have the first one's wave.
     pub twins: Option<(&'static str, &'static str)>,
+    /// From one effect's frequency to the next, rad/s.
+    pub spread_rad_s: f64,
 }
 
 impl Waves {
     pub(super) fn new(waves: Vec<Wave>) -> Self {
-        Self { subsystem: Subsystem::Friction, waves, unexplained: 0.0, twins: None }
+        Self { subsystem: Subsystem::Friction, waves, unexplained: 0.0, twins: None, spread_rad_s: 0.37 }
     }
 
     /// Selects and judges, without quantities to sort by.
@@ -63,7 +65,7 @@ impl Waves {
 
     /// The shape of an effect, or of what no effect has.
     fn shape(&self, which: Option<usize>) -> Vec<f64> {
-        let angular = which.map_or(2.9, |k| 1.1 + 0.37 * k as f64);
+        let angular = which.map_or(2.9, |k| 1.1 + self.spread_rad_s * k as f64);
         (0..COUNT).map(|i| (angular * STEP_S * i as f64).sin()).collect()
     }
 
