@@ -15,12 +15,12 @@ Examples:
   rig trials --seeds 2
   rig trials --seeds 5 --effects thermal_fade wear_drift
   rig trials --effects thermal_fade+m2_ripple
-  rig trials --seeds 3 --pairs --noise 3
+  rig trials --seeds 3 --singles --noise 3
 
 Needs cargo and the project's sources: the generators are a program of their own. rig trials --list shows all
 of its options.")]
 pub(super) struct Trials {
-    /// --seeds N, --effects ID…, --pairs, --outside, --none, --rate-hz HZ, --noise FACTOR, --form, --keep DIR
+    /// --seeds N, --singles, --effects ID…, --pairs, --outside, --none, --rate-hz HZ, --noise FACTOR, --form, --keep DIR
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
     options: Vec<String>,
 }

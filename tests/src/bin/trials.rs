@@ -19,9 +19,9 @@ Examples:
   rig trials --seeds 2
   rig trials --seeds 5 --effects thermal_fade wear_drift
   rig trials --effects thermal_fade+m2_ripple
-  rig trials --seeds 3 --pairs --noise 3
+  rig trials --seeds 3 --singles --noise 3
 
-Without --effects, --pairs, --outside and --none all of them are tried."
+Without --singles, --effects, --pairs, --outside and --none all of them are tried."
 )]
 struct Arguments {
     /// Seeds for each effect
@@ -30,6 +30,9 @@ struct Arguments {
     /// First seed
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
+    /// Each effect that can be named, alone
+    #[arg(long)]
+    singles: bool,
     /// Only these effects; some at once are joined by +, as thermal_fade+m2_ripple
     #[arg(long, value_name = "ID", num_args = 1..)]
     effects: Vec<String>,
@@ -120,13 +123,14 @@ fn rig_command() -> Result<PathBuf, String> {
 }
 
 fn cases(arguments: &Arguments) -> Result<Vec<(Vec<Effect>, u64)>, String> {
-    let all = arguments.effects.is_empty()
+    let all = !arguments.singles
+        && arguments.effects.is_empty()
         && arguments.pairs.is_none()
         && !arguments.outside
         && arguments.none.is_none();
     let fits = |effect: &Effect| matches!(arguments.form, Form::Contact) || effect.works_without_contact();
     let mut hidden: Vec<Vec<Effect>> = Vec::new();
-    if all {
+    if all || arguments.singles {
         hidden.extend(Effect::known().into_iter().filter(fits).map(|effect| vec![effect]));
     }
     for ids in &arguments.effects {
