@@ -296,7 +296,7 @@ fn sentence(judged: &[Judged], lines: &[SpectralLine], verdict: Verdict, causes:
         ),
         Verdict::Named => {
             let names: Vec<String> =
-                causes.iter().map(|c| format!("{} ({:.0} %)", c.id, 100.0 * c.probability)).collect();
+                causes.iter().map(|c| format!("{} ({:.1} %)", c.id, 100.0 * c.probability)).collect();
             format!(
                 "The cause is {}: with it the error on the held-out logs falls from {} to {}; the noise alone would be {}.",
                 names.join(" and "),
