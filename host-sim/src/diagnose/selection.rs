@@ -1,6 +1,6 @@
 //! Which effects, of all that a subsystem's library has, the logs ask for.
 //!
-//! Found by adding and taking out one at a time ([`super::stepwise`]), by scores on the training logs
+//! Found by adding and taking out one at a time (`stepwise.rs`), by scores on the training logs
 //! ([`super::score`]). What is chosen must also lower the error on the held-out logs, which nothing was
 //! fitted to.
 
