@@ -7,6 +7,7 @@ pub mod design;
 pub mod diagnose;
 pub mod files;
 pub mod fit;
+pub mod identify;
 pub mod input_error;
 pub mod link;
 pub mod lockstep;

@@ -1,0 +1,271 @@
+//! A balance that is linear in its parameters: a torque on the left, columns on the right, all through one filter.
+//!
+//! y = Σ p_i x_i + e,   e/σ Student-t (ν = 4), one row in T counted as independent, normal priors on p.
+//! Solved by iterated weighted least squares; the evidence is Laplace's. What is nonlinear in an effect (a delay, a play,
+//! a yield length) is a list of alternatives, which share the effect's prior.
+//!
+//! The noisy side is the response: torques carry the noise, angles little of it.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::contact::noise::slow_share;
+use super::contact::problem::{FREEDOM, SCALES, TYPICAL_SCALE, log_mean_exp};
+use super::filters::median_magnitude;
+use super::linear::{self, dot};
+use super::term::Parameter;
+
+/// A form of an effect in a balance.
+#[derive(Debug, Clone)]
+pub struct Alternative {
+    /// The effect's id.
+    pub effect: &'static str,
+    /// Which form or shape, in words with units; empty where there is one.
+    pub form: String,
+    /// Parameters of the columns.
+    pub parameters: Vec<Parameter>,
+    /// Columns over all rows.
+    pub columns: Vec<Vec<f64>>,
+    /// What is added to the response.
+    pub response: Option<Vec<f64>>,
+    /// Base columns that this form replaces, by their place.
+    pub replaces: Vec<(usize, Vec<f64>)>,
+    /// Change of the prior means of base parameters.
+    pub base_shift: Vec<(usize, f64)>,
+    /// Values of what is not linear.
+    pub constants: Vec<(String, f64)>,
+    /// ln of the prior probability of this shape among those of the effect.
+    pub log_prior: f64,
+}
+
+impl Alternative {
+    /// Columns alone.
+    pub fn columns(effect: &'static str, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>) -> Self {
+        Self {
+            effect,
+            form: String::new(),
+            parameters,
+            columns,
+            response: None,
+            replaces: Vec::new(),
+            base_shift: Vec::new(),
+            constants: Vec::new(),
+            log_prior: 0.0,
+        }
+    }
+}
+
+/// The rows of a balance.
+#[derive(Debug, Clone)]
+pub struct Balance {
+    /// Left side, all grid points of all logs on end.
+    pub response: Vec<f64>,
+    /// Base parameters and columns.
+    pub base: Vec<(Parameter, Vec<f64>)>,
+    /// Deviation of each row.
+    pub deviation: Vec<f64>,
+    /// Rows that take part.
+    pub used: Vec<usize>,
+    /// Rows that count as one.
+    pub temper: f64,
+    /// Distance of the used rows, s.
+    pub row_step_s: f64,
+    /// Where each log's rows begin.
+    pub starts: Vec<usize>,
+}
+
+/// A solved set.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// Places of its alternatives.
+    pub set: Vec<usize>,
+    /// Values: base, then alternative after alternative.
+    pub p: Vec<f64>,
+    /// Standard deviations of the values.
+    pub std: Vec<f64>,
+    /// ln evidence.
+    pub log_evidence: f64,
+    /// Residuals of all points, in the response's unit.
+    pub residual: Vec<f64>,
+}
+
+impl Balance {
+    /// Solves a set of alternatives.
+    pub fn solve(&self, alternatives: &[Alternative], set: &[usize]) -> Solved {
+        let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
+        let mut response = self.response.clone();
+        let mut base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
+        let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
+        let mut log_prior = 0.0;
+        for alternative in &chosen {
+            if let Some(added) = &alternative.response {
+                response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
+            }
+            for (place, column) in &alternative.replaces {
+                base[*place] = column;
+            }
+            for (place, shift) in &alternative.base_shift {
+                parameters[*place].mean += shift;
+            }
+            log_prior += alternative.log_prior;
+        }
+        parameters.extend(chosen.iter().flat_map(|a| a.parameters.iter().cloned()));
+        let columns: Vec<&Vec<f64>> =
+            base.into_iter().chain(chosen.iter().flat_map(|a| a.columns.iter())).collect();
+
+        let y: Vec<f64> = self.used.iter().map(|&i| response[i] / self.deviation[i]).collect();
+        let x: Vec<Vec<f64>> =
+            columns.iter().map(|c| self.used.iter().map(|&i| c[i] / self.deviation[i]).collect()).collect();
+        let n = parameters.len();
+        let mut w = vec![1.0; y.len()];
+        let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
+        let mut r = y.clone();
+        let mut h = DMatrix::zeros(n, n);
+        for _ in 0..10 {
+            let scaled: Vec<f64> = w.iter().map(|w| w / self.temper).collect();
+            let weighted: Vec<Vec<f64>> =
+                x.iter().map(|c| c.iter().zip(&scaled).map(|(x, w)| x * w).collect()).collect();
+            h = DMatrix::from_fn(n, n, |a, b| if b <= a { dot(&weighted[a], &x[b]) } else { 0.0 });
+            h.fill_upper_triangle_with_lower_triangle();
+            let width = |q: &Parameter| if q.amplitude { q.sd * TYPICAL_SCALE } else { q.sd };
+            let mut a = h.clone();
+            let mut g = DVector::from_fn(n, |i, _| dot(&weighted[i], &y));
+            for (i, q) in parameters.iter().enumerate() {
+                a[(i, i)] += 1.0 / width(q).powi(2);
+                g[i] += q.mean / width(q).powi(2);
+            }
+            let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
+            let next = linear::solve_bounded(&a, &g, &lower);
+            let moved = next.iter().zip(&p).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            let size = next.iter().map(|a| a * a).sum::<f64>();
+            p = next.iter().copied().collect();
+            r = y.clone();
+            for (c, p) in x.iter().zip(&p) {
+                r.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
+            }
+            w = r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
+            if moved < 1e-10 * size {
+                break;
+            }
+        }
+        let misfit =
+            0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.temper;
+        let free: Vec<usize> = (0..n).filter(|i| p[*i] > parameters[*i].lower).collect();
+        let log_evidence = log_prior
+            + log_mean_exp(SCALES.iter().map(|scale| {
+                let sd = |i: usize| {
+                    if parameters[i].amplitude { parameters[i].sd * scale } else { parameters[i].sd }
+                };
+                let prior: f64 = (0..n).map(|i| ((p[i] - parameters[i].mean) / sd(i)).powi(2)).sum();
+                let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+                    h[(free[a], free[b])] * sd(free[a]) * sd(free[b]) + f64::from(u8::from(a == b))
+                });
+                -misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
+            }));
+        let mut posterior = h;
+        for (i, q) in parameters.iter().enumerate() {
+            posterior[(i, i)] += 1.0 / q.sd.powi(2);
+        }
+        let covariance = linear::factor(&posterior).inverse();
+        let mut residual = response;
+        for (c, p) in columns.iter().zip(&p) {
+            residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
+        }
+        let std = (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
+        Solved { set: set.to_vec(), p, std, log_evidence, residual }
+    }
+
+    /// The used rows of each log, as places in all points.
+    pub fn rows_of_logs(&self) -> Vec<Vec<usize>> {
+        let end = |at: usize| self.starts.get(at + 1).copied().unwrap_or(self.response.len());
+        (0..self.starts.len())
+            .map(|at| self.used.iter().copied().filter(|i| (self.starts[at]..end(at)).contains(i)).collect())
+            .collect()
+    }
+
+    /// What the base columns but the first make of the response, for the values of the base alone.
+    pub fn bearing(&self, residual: &[f64]) -> Vec<f64> {
+        let p = self.solve(&[], &[]).p;
+        let inertial = &self.base[0].1;
+        (0..self.response.len()).map(|i| self.response[i] - residual[i] - p[0] * inertial[i]).collect()
+    }
+
+    /// RMS over the used rows.
+    pub fn rms(&self, values: &[f64]) -> f64 {
+        (self.used.iter().map(|&i| values[i] * values[i]).sum::<f64>() / self.used.len().max(1) as f64).sqrt()
+    }
+
+    /// RMS of the difference of two residuals over the used rows.
+    pub fn difference(&self, a: &[f64], b: &[f64]) -> f64 {
+        let sum: f64 = self.used.iter().map(|&i| (a[i] - b[i]).powi(2)).sum();
+        (sum / self.used.len().max(1) as f64).sqrt()
+    }
+
+    /// Takes noise level and effective sample size from the residuals of a solved set.
+    pub fn refit_noise(&mut self, solved: &Solved) {
+        let r = |i: &usize| solved.residual[*i] / self.deviation[*i];
+        // Median magnitude of a normal deviate is 0.6745.
+        let factor = (median_magnitude(self.used.iter().map(r)) / 0.6745).max(0.3);
+        let pull: Vec<f64> = self
+            .used
+            .iter()
+            .map(|i| {
+                let r = r(i) / factor;
+                r * (FREEDOM + 1.0) / (FREEDOM + r * r)
+            })
+            .collect();
+        self.deviation.iter_mut().for_each(|d| *d *= factor);
+        self.temper = slow_share(&pull, self.row_step_s).max(1.0);
+    }
+}
+
+/// Sets with their evidence, best first; the empty set is among them.
+pub fn search(balance: &mut Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
+    let empty = balance.solve(alternatives, &[]);
+    let mut all = vec![empty];
+    for round in 0..2 {
+        let mut found = vec![balance.solve(alternatives, &[])];
+        let mut parents: Vec<Vec<usize>> = vec![Vec::new()];
+        for _ in 0..most {
+            let mut sets: Vec<Vec<usize>> = Vec::new();
+            for parent in &parents {
+                for a in 0..alternatives.len() {
+                    if parent.iter().any(|b| alternatives[*b].effect == alternatives[a].effect) {
+                        continue;
+                    }
+                    let mut set = parent.clone();
+                    set.push(a);
+                    set.sort_unstable();
+                    if !sets.contains(&set) {
+                        sets.push(set);
+                    }
+                }
+            }
+            let mut solved: Vec<Solved> =
+                sets.par_iter().map(|set| balance.solve(alternatives, set)).collect();
+            solved.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+            // The best shape of each combination of effects leads on.
+            let effects = |set: &[usize]| {
+                let mut names: Vec<&str> = set.iter().map(|a| alternatives[*a].effect).collect();
+                names.sort_unstable();
+                names
+            };
+            let mut seen: Vec<Vec<&str>> = Vec::new();
+            solved.retain(|s| {
+                let names = effects(&s.set);
+                let new = !seen.contains(&names);
+                seen.push(names);
+                new
+            });
+            parents = solved.iter().take(3).map(|s| s.set.clone()).collect();
+            found.extend(solved);
+        }
+        found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        if round == 0 {
+            let best = found[0].clone();
+            balance.refit_noise(&best);
+        }
+        all = found;
+    }
+    all
+}

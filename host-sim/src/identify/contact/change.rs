@@ -1,0 +1,122 @@
+//! What a hypothesis changes in the contact's balance, whatever effect asked for it.
+
+use super::law::Ageing;
+use crate::identify::term::{Column, Parameter, Starts};
+
+/// Changes to the contact and its sensor; several effects add up.
+#[derive(Debug, Clone, Default)]
+pub struct Change {
+    /// ln of what friction is multiplied with, per log and point.
+    pub log_factor: Option<Column>,
+    /// What the friction channel shows besides friction, N m, per log and point.
+    pub shown_nm: Option<Column>,
+    /// ln of what the friction curve is multiplied with, over [`super::law::speeds`].
+    pub log_curve: Option<Vec<f64>>,
+    /// Force per slip speed whatever the load, N s/m.
+    pub film_n_s_per_m: f64,
+    /// Stiffness of the Maxwell branches, N/m.
+    pub branches_n_per_m: [f64; 3],
+    /// Ageing of the contact.
+    pub ageing: Option<Ageing>,
+    /// How much later than the rig file says the friction channel is, s.
+    pub late_s: f64,
+    /// Mode of the sensor in place of the rig file's: Hz, damping ratio.
+    pub mode: Option<(f64, f64)>,
+    /// Stiffness and damping in series with the slip, in place of the baseline's: N/m, N s/m.
+    pub block: Option<(f64, f64)>,
+    /// Ends of the friction channel, N m.
+    pub ends_nm: Option<(f64, f64)>,
+    /// Way of the root in place of the logged one, m, per log and point.
+    pub root_m: Option<Column>,
+}
+
+impl Change {
+    /// Adds `size` times a column to the logarithm of friction.
+    pub fn add_log_factor(&mut self, columns: &[Column], sizes: &[f64]) {
+        add(&mut self.log_factor, columns, sizes);
+    }
+
+    /// Adds `size` times a column to what the channel shows.
+    pub fn add_shown(&mut self, columns: &[Column], sizes: &[f64]) {
+        add(&mut self.shown_nm, columns, sizes);
+    }
+}
+
+fn add(to: &mut Option<Column>, columns: &[Column], sizes: &[f64]) {
+    let Some(first) = columns.first() else { return };
+    let sum = to.get_or_insert_with(|| first.iter().map(|log| vec![0.0; log.len()]).collect());
+    for (column, size) in columns.iter().zip(sizes).filter(|(_, size)| **size != 0.0) {
+        for (sum, values) in sum.iter_mut().zip(column) {
+            sum.iter_mut().zip(values).for_each(|(s, x)| *s += size * x);
+        }
+    }
+}
+
+/// One form of an effect in the contact's balance.
+pub struct ContactTerm {
+    /// The effect's id.
+    pub effect: &'static str,
+    /// Which of its forms; empty where there is one.
+    pub form: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Where its search starts.
+    pub starts: Starts,
+    /// Columns of the logarithm of friction in which it is linear, where it is.
+    pub columns: Option<Vec<Column>>,
+    /// Whether it is a law that can be exported: a law instead of columns.
+    pub law: bool,
+    /// What it changes.
+    pub act: Box<dyn Fn(&[f64], &mut Change) + Send + Sync>,
+}
+
+impl ContactTerm {
+    /// Friction multiplied with e^(Σ size × column).
+    pub fn factor(
+        effect: &'static str,
+        form: &'static str,
+        columns: Vec<Column>,
+        parameters: Vec<Parameter>,
+    ) -> Self {
+        let zero = parameters.iter().map(|p| if p.lower == 0.0 { 0.02 } else { 0.0 }).collect();
+        let shared = columns.clone();
+        Self {
+            effect,
+            form,
+            parameters,
+            starts: Starts::At(vec![zero]),
+            columns: Some(columns),
+            law: false,
+            act: Box::new(move |sizes, change| change.add_log_factor(&shared, sizes)),
+        }
+    }
+
+    /// The channel shows Σ size × column besides friction.
+    pub fn shown(
+        effect: &'static str,
+        form: &'static str,
+        columns: Vec<Column>,
+        parameters: Vec<Parameter>,
+    ) -> Self {
+        let zero = vec![0.0; parameters.len()];
+        Self {
+            effect,
+            form,
+            parameters,
+            starts: Starts::At(vec![zero]),
+            columns: None,
+            law: false,
+            act: Box::new(move |sizes, change| change.add_shown(&columns, sizes)),
+        }
+    }
+
+    /// Any change.
+    pub fn any(
+        effect: &'static str,
+        parameters: Vec<Parameter>,
+        starts: Starts,
+        act: impl Fn(&[f64], &mut Change) + Send + Sync + 'static,
+    ) -> Self {
+        Self { effect, form: "", parameters, starts, columns: None, law: false, act: Box::new(act) }
+    }
+}

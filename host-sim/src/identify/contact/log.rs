@@ -1,0 +1,199 @@
+//! A contact log made ready for the observer of the slip.
+
+use crate::files::log::Log;
+use crate::files::rig_file::RigFile;
+use crate::files::signal::Signal;
+use crate::identify::filters::{gaussian, gradient, local_maximum, shifted};
+use crate::identify::grid::Grid;
+use crate::input_error::InputError;
+use crate::predict::BridgeModel;
+
+/// Width of the Gaussian over which speed column and angle are blended, samples: above it the speed column is the
+/// quieter, below it the angle.
+const BLEND: f64 = 12.0;
+
+/// Signals of a contact log on an even grid, SI units.
+#[derive(Debug, Clone)]
+pub struct ContactLog {
+    /// The log's name.
+    pub source: String,
+    /// The grid.
+    pub grid: Grid,
+    /// Friction radius, m.
+    pub radius_m: f64,
+    /// Angle of the disc, from angle and speed columns.
+    pub angle_rad: Vec<f64>,
+    /// Speed of the disc as logged (or from its angle).
+    pub speed_rad_s: Vec<f64>,
+    /// Way of the element's root over the road, m.
+    pub root_m: Vec<f64>,
+    /// Its speed, smoothed over a few samples, m/s.
+    pub root_speed_m_s: Vec<f64>,
+    /// Normal force, smoothed where it is steady and taken ahead by its bridge's delay, N.
+    pub load_n: Vec<f64>,
+    /// Its largest change a sample near by, N.
+    pub load_change_n: Vec<f64>,
+    /// Normal force as logged, N.
+    pub normal_n: Vec<f64>,
+    /// Friction torque as logged, N m.
+    pub friction_nm: Vec<f64>,
+    /// The same, lightly smoothed: what the slip is observed from.
+    pub observed_nm: Vec<f64>,
+    /// The same, smoothed more: for coordinates and noise levels.
+    pub smooth_nm: Vec<f64>,
+    /// Its largest change a sample near by, N m.
+    pub friction_change_nm: Vec<f64>,
+    /// Torque of M1, N m.
+    pub m1_torque_nm: Option<Vec<f64>>,
+    /// Angle of M1, rad.
+    pub m1_angle_rad: Option<Vec<f64>>,
+    /// Torque of M2, N m.
+    pub m2_torque_nm: Option<Vec<f64>>,
+    /// Surface temperature, °C.
+    pub temperature_c: Option<Vec<f64>>,
+    /// Whether a point takes part: covered by samples, and whatever an effect's file takes out.
+    pub usable: Vec<bool>,
+    /// Noise of the friction channel, N m.
+    pub friction_noise_nm: f64,
+    /// Noise of the normal channel, N.
+    pub normal_noise_n: f64,
+    /// Noise of the root's speed from sample to sample, m/s.
+    pub speed_noise_m_s: f64,
+    /// How late the friction channel is by the rig file, samples.
+    pub friction_late: f64,
+}
+
+impl ContactLog {
+    /// Prepares a log.
+    ///
+    /// # Errors
+    /// Where a column is missing.
+    pub fn new(log: &Log, rig: &RigFile) -> Result<Self, InputError> {
+        let signals = log.contact()?;
+        let stamps = signals.time_s;
+        let grid = Grid::new(stamps);
+        let on_grid = |values: &[f64]| grid.channel(stamps, values);
+        let optional = |signal| log.signal(signal).map(&on_grid);
+        let step_s = grid.step_s;
+
+        let friction_nm = on_grid(signals.friction_torque_nm);
+        let normal_n = on_grid(signals.normal_force_n);
+        let friction_noise_nm = grid.noise(&friction_nm, signals.friction_torque_nm);
+        let normal_noise_n = grid.noise(&normal_n, signals.normal_force_n);
+
+        let speed_column = log.signal(Signal::M2Speed).map(&on_grid);
+        let angle_column = log.signal(Signal::M2Angle).map(|angle| on_grid(&unwrapped(angle)));
+        let (angle_rad, speed_noise) = motion(&grid, speed_column.as_deref(), angle_column.as_deref());
+        let speed_rad_s =
+            speed_column.unwrap_or_else(|| gradient(&angle_rad).iter().map(|d| d / step_s).collect());
+        let radius_m = rig.friction_radius_m;
+        let root_m: Vec<f64> = angle_rad.iter().map(|a| radius_m * a).collect();
+        let speed: Vec<f64> = gradient(&root_m).iter().map(|d| d / step_s).collect();
+
+        let ahead = BridgeModel::delay_s(&rig.normal_bridge) / step_s;
+        let load_n = shifted(&steady_smoothed(&normal_n, normal_noise_n), ahead);
+        let load_change_n = local_maximum(&magnitudes(&gradient(&load_n)), 2);
+        let smooth_nm = gaussian(&friction_nm, 2.0, 0);
+        let friction_change_nm = local_maximum(&magnitudes(&gradient(&smooth_nm)), 2);
+
+        let mut usable = grid.covered.clone();
+        // The observer's first state is a guess.
+        usable.iter_mut().take(5).for_each(|u| *u = false);
+        Ok(Self {
+            source: log.source.clone(),
+            root_speed_m_s: gaussian(&speed, 3.0, 0),
+            observed_nm: gaussian(&friction_nm, 0.8, 0),
+            friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
+            speed_noise_m_s: radius_m * speed_noise,
+            m1_torque_nm: optional(Signal::M1Torque),
+            m1_angle_rad: optional(Signal::M1Angle),
+            m2_torque_nm: optional(Signal::M2Torque),
+            temperature_c: optional(Signal::SurfaceTemperature),
+            grid,
+            radius_m,
+            angle_rad,
+            speed_rad_s,
+            root_m,
+            load_n,
+            load_change_n,
+            normal_n,
+            friction_nm,
+            smooth_nm,
+            friction_change_nm,
+            usable,
+            friction_noise_nm,
+            normal_noise_n,
+        })
+    }
+
+    /// Points of the grid.
+    pub fn len(&self) -> usize {
+        self.grid.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.grid.is_empty()
+    }
+}
+
+fn magnitudes(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|x| x.abs()).collect()
+}
+
+/// Angle of the disc from both columns, and the noise of its slope, rad/s.
+fn motion(grid: &Grid, speed: Option<&[f64]>, angle: Option<&[f64]>) -> (Vec<f64>, f64) {
+    let step_s = grid.step_s;
+    let noise = |values: &[f64]| crate::identify::noise::standard_deviation(values);
+    let slope_noise = |angle: &[f64]| std::f64::consts::SQRT_2 * noise(angle) / step_s;
+    let integrated = |speed: &[f64]| {
+        let mut sum = 0.0;
+        let mut sums = vec![0.0; speed.len()];
+        for i in 1..speed.len() {
+            sum += 0.5 * (speed[i] + speed[i - 1]) * step_s;
+            sums[i] = sum;
+        }
+        sums
+    };
+    match (speed, angle) {
+        (Some(speed), None) => (integrated(speed), noise(speed)),
+        (Some(speed), Some(angle)) if noise(speed) < slope_noise(angle) => {
+            let from_speed = integrated(speed);
+            let off: Vec<f64> = from_speed.iter().zip(angle).map(|(s, a)| s - a).collect();
+            let off = gaussian(&off, BLEND, 0);
+            (from_speed.iter().zip(off).map(|(s, off)| s - off).collect(), noise(speed))
+        }
+        (_, Some(angle)) => (angle.to_vec(), slope_noise(angle)),
+        (None, None) => (vec![0.0; grid.len()], 0.0),
+    }
+}
+
+/// Smoothed over many samples where the signal is steady, over few where it moves: the weight follows how far two
+/// smoothed versions differ against what noise alone would make of that (a quarter of its variance).
+fn steady_smoothed(values: &[f64], noise: f64) -> Vec<f64> {
+    let (narrow, wide) = (gaussian(values, 1.0, 0), gaussian(values, 6.0, 0));
+    let square: Vec<f64> = narrow.iter().zip(&wide).map(|(a, b)| (a - b) * (a - b)).collect();
+    let activity = gaussian(&square, 6.0, 0);
+    let variance = (noise * noise).max(1e-24);
+    (0..values.len())
+        .map(|i| {
+            let weight = ((activity[i] / variance - 0.8) / 4.0).clamp(0.0, 1.0);
+            weight * narrow[i] + (1.0 - weight) * wide[i]
+        })
+        .collect()
+}
+
+/// Takes out jumps by a revolution.
+pub fn unwrapped(angle_rad: &[f64]) -> Vec<f64> {
+    use std::f64::consts::{PI, TAU};
+    let (mut turns, mut last) = (0.0, angle_rad.first().copied().unwrap_or(0.0));
+    let unwrap = |angle: &f64| {
+        let jump = angle - last;
+        last = *angle;
+        if jump.abs() > PI {
+            turns -= (jump / TAU).round();
+        }
+        angle + turns * TAU
+    };
+    angle_rad.iter().map(unwrap).collect()
+}

@@ -1,0 +1,10 @@
+//! The contact: friction torque from motion and load, with the slip observed from the measured force.
+
+pub mod baseline;
+pub mod change;
+pub mod law;
+pub mod log;
+pub(in crate::identify) mod noise;
+pub mod observer;
+pub mod problem;
+pub mod search;

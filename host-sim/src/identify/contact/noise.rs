@@ -1,0 +1,179 @@
+//! Standard deviation of the friction channel about a right model, sample by sample, from named sources.
+//!
+//! σ² = Σ a_s n_s², with a_s = 1 before and fitted to the residuals (a_s ≥ 0) after a first fit:
+//!
+//! | source | n |
+//! |---|---|
+//! | sensor | its noise, from the channel alone |
+//! | motion between samples | 0.3 of the channel's change a sample; likewise the prediction's |
+//! | load between samples | a quarter of the load's change a sample |
+//! | form of the model | 0.4 % of the force |
+//! | noise of the slip speed | through g′, where the tip slips |
+//! | noise of the root's motion | through the stiffness, where it sticks |
+//! | transitions | 3 % of the load near a change between slip and stick |
+
+use nalgebra::{DMatrix, DVector};
+
+use super::law::Curve;
+use super::log::ContactLog;
+use super::problem::{FREEDOM, Prediction};
+use crate::identify::filters::{gradient, local_maximum};
+use crate::identify::linear;
+
+/// What no model of friction is more accurate than, relative.
+pub const MODEL_FORM: f64 = 0.004;
+/// Share of a change within a sample that is not known: about 1/√12, the deviation of an even distribution.
+const BETWEEN_SAMPLES: f64 = 0.3;
+/// Error near a transition between slip and stick, relative to the load.
+const TRANSITION: f64 = 0.03;
+/// Sources.
+const SOURCES: usize = 8;
+/// Frequency below which effects live, Hz; above it residuals only tell how white they are.
+const SLOW_HZ: f64 = 30.0;
+
+/// The noise model.
+#[derive(Debug, Clone, Default)]
+pub struct Noise {
+    /// Deviation of each sample, N m.
+    pub deviation: Vec<f64>,
+    /// n² of each source for each sample.
+    sources: Vec<[f64; SOURCES]>,
+    /// Samples that count as one: the spectral density of the residuals below [`SLOW_HZ`] over their variance.
+    pub temper: f64,
+    /// The sensor's factor a, as fitted.
+    pub sensor_factor: f64,
+}
+
+impl Noise {
+    /// Before anything is fitted.
+    pub fn new(logs: &[ContactLog], curve: &Curve, stiffness_n_per_m: f64, prediction: &Prediction) -> Self {
+        let mut sources = Vec::new();
+        let mut from = 0;
+        for (log, observed) in logs.iter().zip(&prediction.observed) {
+            let shown = &prediction.shown_nm[from..from + log.len()];
+            from += log.len();
+            let magnitude = |x: Vec<f64>| x.into_iter().map(f64::abs).collect::<Vec<f64>>();
+            let wide_change = local_maximum(&log.friction_change_nm, 2);
+            // What the prediction does that the channel does not is an error and no noise, and the other way round.
+            let predicted = local_maximum(&magnitude(gradient(shown)), 3);
+            let floor = log.friction_noise_nm;
+            let predicted: Vec<f64> =
+                predicted.iter().zip(&wide_change).map(|(p, m)| p.min(3.0 * m + floor)).collect();
+            let wide_predicted = local_maximum(&predicted, 6);
+            let transition = local_maximum(
+                &magnitude(gradient(
+                    &observed.sliding.iter().map(|s| f64::from(u8::from(*s > 0.5))).collect::<Vec<f64>>(),
+                )),
+                4,
+            );
+            let slip_noise =
+                log.speed_noise_m_s.max(1e-3 * crate::identify::filters::rms(&log.root_speed_m_s));
+            let radius = log.radius_m;
+            for i in 0..log.len() {
+                let changed = wide_change[i].min(2.0 * wide_predicted[i] + floor);
+                let sliding = observed.sliding[i] > 0.5;
+                let slope =
+                    if sliding { curve.slope(observed.slip_m_s[i].abs().max(3.0 * slip_noise)) } else { 0.0 };
+                let load = log.load_n[i].max(0.0);
+                sources.push(
+                    [
+                        log.friction_noise_nm,
+                        BETWEEN_SAMPLES * changed,
+                        BETWEEN_SAMPLES * predicted[i],
+                        0.25 * radius * log.load_change_n[i],
+                        MODEL_FORM * log.smooth_nm[i],
+                        radius * load * slope * slip_noise,
+                        if sliding {
+                            0.0
+                        } else {
+                            2.0 * radius * stiffness_n_per_m * log.speed_noise_m_s * log.grid.step_s
+                        },
+                        if transition[i] > 0.0 { TRANSITION * radius * load } else { 0.0 },
+                    ]
+                    .map(|n| n * n),
+                );
+            }
+        }
+        let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
+        let mut noise = Self { deviation: Vec::new(), sources, temper: 3.0 / density, sensor_factor: 1.0 };
+        noise.weigh(&[1.0; SOURCES]);
+        noise
+    }
+
+    fn weigh(&mut self, factors: &[f64; SOURCES]) {
+        let sum = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>();
+        self.deviation = self.sources.iter().map(|n| sum(n).max(1e-24).sqrt()).collect();
+    }
+
+    /// Fits the sources' factors to residuals (over the present deviations) and takes the effective sample size from
+    /// their spectrum.
+    pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
+        let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
+        let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
+        let mut factors = [1.0; SOURCES];
+        // A prior of 0.2 % of the samples at a factor of one.
+        let strength = 2e-3 * used.len() as f64;
+        let scale: [f64; SOURCES] = std::array::from_fn(|s| {
+            used.iter().map(|&i| self.sources[i][s]).sum::<f64>() / used.len().max(1) as f64
+        });
+        for _ in 0..6 {
+            let (mut h, mut g) = (DMatrix::<f64>::zeros(SOURCES, SOURCES), DVector::<f64>::zeros(SOURCES));
+            for (&i, &y) in used.iter().zip(&square) {
+                let n = &self.sources[i];
+                let v = n.iter().zip(&factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
+                // Beyond three deviations a residual is the tail's; the cut costs 15 % of a Gaussian's variance.
+                let y = y.min(9.0 * v) * 1.15;
+                for a in 0..SOURCES {
+                    g[a] += n[a] * y / (v * v);
+                    for b in 0..=a {
+                        h[(a, b)] += n[a] * n[b] / (v * v);
+                    }
+                }
+            }
+            h.fill_upper_triangle_with_lower_triangle();
+            let typical =
+                used.iter().map(|&i| self.deviation[i].powi(2)).sum::<f64>() / used.len().max(1) as f64;
+            for s in 0..SOURCES {
+                let weight = 1e-2 * strength * (scale[s] / typical).powi(2) + 1e-30;
+                h[(s, s)] += weight;
+                g[s] += weight;
+            }
+            let found = linear::non_negative(&h, &g);
+            factors = std::array::from_fn(|s| found[s].max(1e-3));
+            factors[0] = factors[0].max(0.2);
+        }
+        self.sensor_factor = factors[0];
+        let before = std::mem::take(&mut self.deviation);
+        self.weigh(&factors);
+        // Influence of each residual on a slow parameter.
+        let pull: Vec<f64> = r
+            .iter()
+            .zip(before.iter().zip(&self.deviation))
+            .map(|(r, (old, new))| {
+                let r = r * old / new;
+                r * (FREEDOM + 1.0) / (FREEDOM + r * r)
+            })
+            .collect();
+        let mut from = 0;
+        let mut shares = Vec::new();
+        for log in logs {
+            shares.push(slow_share(&pull[from..from + log.len()], log.grid.step_s));
+            from += log.len();
+        }
+        let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
+        self.temper = (shares.iter().sum::<f64>() / shares.len().max(1) as f64).max(1.0 / density);
+    }
+}
+
+/// Mean spectral density below [`SLOW_HZ`] over that of all frequencies: from the variance of means over blocks of half a
+/// period of that frequency, which is its spectral window.
+pub fn slow_share(values: &[f64], step_s: f64) -> f64 {
+    let block = (0.5 / (SLOW_HZ * step_s)).round().max(1.0) as usize;
+    let all = values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
+    let (mut sum, mut count) = (0.0, 0);
+    for chunk in values.chunks_exact(block) {
+        sum += chunk.iter().sum::<f64>().powi(2) / block as f64;
+        count += 1;
+    }
+    if all > 0.0 && count > 0 { sum / f64::from(count) / all } else { 1.0 }
+}

@@ -1,0 +1,243 @@
+//! The slip, observed from the measured force, and the force that the law makes of it.
+//!
+//! The friction force F is measured, so what is in series with the slip need not be simulated:
+//!
+//! u̇ = (F − k u − Σ k_b e_b)/c,  ė_b = u̇ − e_b/τ_b,  w = V − u̇
+//!
+//! solved exactly for a force that goes in straight lines between samples. Where the tip slips the law is evaluated at
+//! the observed slip, F = sgn(w) (F_N g(|w|) e^m + viscous); where it sticks F = k u + c V + branches, u integrated from
+//! the motion with a weak pull to the measurement, held below breakaway. The two are blended smoothly, since a switch
+//! makes the likelihood rough: s is a product of sigmoids in the slip speed, in its ratio to the root's speed and in the
+//! force's size and sign.
+//!
+//! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
+//! Left out: what the force did between samples; slip that begins and ends within one.
+
+use super::law::{BRANCH_TIMES_S, Contact, Curve};
+use nalgebra::{DMatrix, SMatrix, SVector};
+
+/// Width of the sigmoids, relative to their threshold.
+const WIDTH: f64 = 0.05;
+/// Slip is more than this share of the root's speed: below it the block follows the root.
+const LEAST_SHARE: f64 = 0.5;
+/// In slip the force is more than this share of F_N g(∞).
+const LEAST_FORCE: f64 = 0.3;
+/// Softness of the limit at breakaway, relative.
+const LIMIT_WIDTH: f64 = 1e-3;
+/// A contact carries nothing below this share of the log's largest load.
+const LEAST_LOAD: f64 = 2e-3;
+
+/// What the pass is driven with, for one log.
+#[derive(Debug, Clone, Copy)]
+pub struct Drive<'a> {
+    /// Step, s.
+    pub step_s: f64,
+    /// Way of the root, m.
+    pub root_m: &'a [f64],
+    /// Normal force, N.
+    pub load_n: &'a [f64],
+    /// Measured friction force with the sensor taken off, N.
+    pub force_n: &'a [f64],
+    /// m(t) of the friction coefficient's factor e^m, where something changes it.
+    pub log_factor: Option<&'a [f64]>,
+    /// Slip speed that counts as slip, m/s.
+    pub slip_threshold_m_s: f64,
+    /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
+    pub noise: (f64, f64),
+}
+
+/// What came out, sample by sample.
+#[derive(Debug, Clone, Default)]
+pub struct Observed {
+    /// Friction force by the law, N.
+    pub force_n: Vec<f64>,
+    /// Slip speed, m/s.
+    pub slip_m_s: Vec<f64>,
+    /// Share of slip in the blend, 0 to 1.
+    pub sliding: Vec<f64>,
+}
+
+#[inline]
+fn sigmoid(x: f64) -> f64 {
+    if x > 30.0 {
+        1.0
+    } else if x < -30.0 {
+        0.0
+    } else {
+        1.0 / (1.0 + (-x).exp())
+    }
+}
+
+/// The block as an exact recursion over a step: states (u, e_b), force in a straight line.
+struct Block {
+    /// Next = state·a + b0·F₀ + b1·F₁; without branches only the first entry is used.
+    transition: SMatrix<f64, 4, 4>,
+    from: SVector<f64, 4>,
+    to: SVector<f64, 4>,
+    branched: bool,
+}
+
+impl Block {
+    fn new(contact: &Contact, step_s: f64) -> Self {
+        let k = contact.stiffness_n_per_m;
+        // A spring without damping follows the force at once; a time constant of 1e-3 of a step says the same.
+        let c = contact.damping_n_s_per_m.max(1e-3 * step_s * k);
+        let kb = contact.branches_n_per_m;
+        let branched = kb.iter().any(|k| *k > 0.0);
+        if !branched {
+            let tau = c / k;
+            let e = (-step_s / tau).exp();
+            let mean = tau / step_s * (1.0 - e);
+            let mut block =
+                Self { transition: SMatrix::zeros(), from: SVector::zeros(), to: SVector::zeros(), branched };
+            (block.transition[(0, 0)], block.from[0], block.to[0]) = (e, (mean - e) / k, (1.0 - mean) / k);
+            return block;
+        }
+        // Van Loan: the exponential of the system beside the input and its slope.
+        let mut a = DMatrix::<f64>::zeros(6, 6);
+        for row in 0..4 {
+            a[(row, 0)] = -k / c;
+            for b in 0..3 {
+                a[(row, 1 + b)] = -kb[b] / c;
+            }
+            a[(row, 4)] = 1.0 / c;
+        }
+        for (b, time_s) in BRANCH_TIMES_S.iter().enumerate() {
+            a[(1 + b, 1 + b)] -= 1.0 / time_s;
+        }
+        a[(4, 5)] = 1.0 / step_s;
+        let e = (a * step_s).exp();
+        let slope = SVector::<f64, 4>::from_fn(|i, _| e[(i, 5)]);
+        Self {
+            transition: SMatrix::from_fn(|i, j| e[(i, j)]),
+            from: SVector::from_fn(|i, _| e[(i, 4)]) - slope,
+            to: slope,
+            branched,
+        }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut SVector<f64, 4>, from_n: f64, to_n: f64) {
+        if self.branched {
+            *state = self.transition * *state + self.from * from_n + self.to * to_n;
+        } else {
+            state[0] = self.transition[(0, 0)] * state[0] + self.from[0] * from_n + self.to[0] * to_n;
+        }
+    }
+}
+
+/// Kalman gain of a random walk of variance `motion`² a step seen with the deviation `force` (both N).
+fn stick_gain(motion: f64, force: f64) -> f64 {
+    let ratio = (motion / force.max(1e-12)).powi(2);
+    if ratio > 1e6 { 1.0 } else { 0.5 * ((ratio * (ratio + 4.0)).sqrt() - ratio) }
+}
+
+/// Runs over a log.
+pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
+    let n = drive.root_m.len();
+    let dt = drive.step_s;
+    let mut out = Observed { force_n: vec![0.0; n], slip_m_s: vec![0.0; n], sliding: vec![0.0; n] };
+    if n < 3 {
+        return out;
+    }
+    let block = Block::new(contact, dt);
+    let (k, c) = (contact.stiffness_n_per_m, contact.damping_n_s_per_m);
+    let force = drive.force_n;
+    let mut start = SVector::<f64, 4>::zeros();
+    start[0] = force[0] / k;
+
+    // First the slip speeds, then, smoothed over three samples, the law.
+    let mut state = start;
+    for i in 1..n {
+        let before = state[0];
+        block.step(&mut state, force[i - 1], force[i]);
+        out.sliding[i] = (drive.root_m[i] - drive.root_m[i - 1]) / dt - (state[0] - before) / dt;
+    }
+    for i in 1..n {
+        let next = if i + 1 < n { out.sliding[i + 1] } else { out.sliding[i] };
+        let last = if i > 1 { out.sliding[i - 1] } else { out.sliding[i] };
+        out.slip_m_s[i] = 0.25 * last + 0.5 * out.sliding[i] + 0.25 * next;
+    }
+
+    let (per_log, log_slowest) = Curve::scale_of_table();
+    let (coulomb, rest) = (contact.curve.at_speed(), contact.curve.at_rest());
+    let least_load = LEAST_LOAD * drive.load_n.iter().copied().fold(0.0, f64::max);
+    let threshold = drive.slip_threshold_m_s;
+    let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
+    let branch: [f64; 3] = std::array::from_fn(|b| 1.0 / (1.0 + dt / BRANCH_TIMES_S[b]));
+    let mut observed = start;
+    let mut held = start;
+    let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
+    let (per_load, film) = contact.viscous;
+    out.force_n[0] = force[0];
+    for i in 1..n {
+        block.step(&mut observed, force[i - 1], force[i]);
+        let v = (drive.root_m[i] - drive.root_m[i - 1]) / dt;
+        let w = out.slip_m_s[i];
+        let speed = w.abs();
+        let load = drive.load_n[i];
+        if load <= least_load {
+            held = observed;
+            out.force_n[i] = 0.0;
+            out.sliding[i] = 1.0;
+            continue;
+        }
+        let mut loaded = drive.log_factor.map_or(load, |m| load * m[i].exp());
+        if let Some(ageing) = contact.ageing {
+            loaded *= 1.0 + ageing.growth * (age / ageing.onset_s).ln_1p();
+        }
+        let sign = if w > 0.0 { 1.0 } else { -1.0 };
+        let resisting = sign * force[i] / (load * coulomb);
+        let slips = sigmoid((speed / threshold - 1.0) / WIDTH)
+            * sigmoid((speed / (v.abs() + 1e-3 * threshold) / LEAST_SHARE - 1.0) / WIDTH)
+            * sigmoid((resisting / LEAST_FORCE - 1.0) / WIDTH);
+        out.sliding[i] = slips;
+
+        let sliding = if slips > 1e-9 {
+            sign * (loaded * contact.curve.at(speed, per_log, log_slowest)
+                + (per_load * loaded + film) * speed)
+        } else {
+            0.0
+        };
+        if slips < 1.0 - 1e-9 {
+            let moved = v * dt;
+            let mut sticking = k * (held[0] + moved) + c * v;
+            for b in 0..3 {
+                sticking += contact.branches_n_per_m[b] * (held[1 + b] + moved) * branch[b];
+            }
+            // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
+            let limit = loaded * rest;
+            let towards = sigmoid((sticking.signum() * v / (0.1 * threshold) - 1.0) / WIDTH);
+            let over = (sticking.abs() - limit) / (LIMIT_WIDTH * limit);
+            let beyond = if over > 30.0 {
+                sticking.abs() - limit
+            } else if over < -30.0 {
+                0.0
+            } else {
+                LIMIT_WIDTH * limit * over.exp().ln_1p()
+            };
+            let breaks = sigmoid(over) * towards;
+            sticking -= sticking.signum() * beyond * towards;
+            let pulled = gain * (force[i] - sticking) / k;
+            let follows = slips + (1.0 - slips) * breaks;
+            held[0] = follows * observed[0] + (1.0 - follows) * (held[0] + moved + pulled);
+            for b in 0..3 {
+                held[1 + b] = follows * observed[1 + b] + (1.0 - follows) * (held[1 + b] + moved) * branch[b];
+            }
+            out.force_n[i] = slips * sliding + (1.0 - slips) * sticking;
+        } else {
+            held = observed;
+            out.force_n[i] = sliding;
+        }
+        if let Some(ageing) = contact.ageing {
+            let renewed = speed * dt / ageing.renewal_m;
+            let aged = if renewed > 1e-6 {
+                age * (-renewed).exp() - dt * (-renewed).exp_m1() / renewed
+            } else {
+                age + dt
+            };
+            age = slips * aged + (1.0 - slips) * (age + dt);
+        }
+    }
+    out
+}

@@ -1,0 +1,485 @@
+//! The contact's balance as one likelihood: what the friction channel should have shown, given the observed slip.
+//!
+//! y = channel( F(observed slip; parameters) ) + e,   e/σ Student-t with ν = 4, σ from named sources
+//! ([`super::noise`]), a share 1/T of the samples counted as independent. Normal priors on all parameters; those of the
+//! baseline are bounded smoothly at three deviations, so that nothing else can hide in them.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::change::{Change, ContactTerm};
+use super::law::{Contact, Curve};
+use super::log::ContactLog;
+use super::noise::Noise;
+use super::observer::{Drive, Observed, observe};
+use crate::identify::filters::{gaussian, rms, shifted};
+use crate::identify::linear::{self, normal_equations};
+use crate::identify::term::{Parameter, Starts};
+use crate::predict::SecondOrder;
+
+/// Degrees of freedom of Student's t: tails for what the noise model does not name.
+pub const FREEDOM: f64 = 4.0;
+/// The baseline's parameters stay within so many deviations of their prior.
+const BOUND: f64 = 3.0;
+/// Slip is faster than this share of the root's usual speed, …
+const SLOWEST_SLIP: f64 = 0.015;
+/// … and than so many deviations of the speed's noise.
+const SLIP_NOISES: f64 = 4.0;
+/// Drift of the root against the measured motion, relative to its usual speed: what the elements' way differs by.
+const DRIFT: f64 = 5e-4;
+/// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
+const SIMULATED_MODE: f64 = 0.25;
+
+/// Which number of the contact a baseline parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Coulomb coefficient.
+    A0,
+    /// Static minus Coulomb coefficient.
+    A1,
+    /// Stribeck speed.
+    V0,
+    /// Stribeck exponent.
+    Delta,
+    /// Friction per load and slip speed.
+    A2,
+    /// Stiffness in series.
+    Stiffness,
+    /// Its damping.
+    Damping,
+    /// How late the channel is, ms; not a logarithm.
+    Late,
+}
+
+/// Numbers of the contact before anything is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numbers {
+    /// Coulomb coefficient, with the road factor.
+    pub a0: f64,
+    /// Static minus Coulomb coefficient, with the road factor.
+    pub a1: f64,
+    /// Stribeck speed, m/s.
+    pub v0_m_s: f64,
+    /// Stribeck exponent.
+    pub delta: f64,
+    /// Viscous coefficient, s/m.
+    pub a2_s_per_m: f64,
+    /// Stiffness in series, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Its damping, N s/m.
+    pub damping_n_s_per_m: f64,
+    /// Lateness of the channel beyond the rig file's, ms.
+    pub late_ms: f64,
+}
+
+/// A baseline parameter.
+#[derive(Debug, Clone)]
+pub struct BaseParameter {
+    /// Which.
+    pub role: Role,
+    /// Name and prior.
+    pub parameter: Parameter,
+}
+
+/// The baseline: what the model file says, and how sure it is.
+#[derive(Debug, Clone)]
+pub struct Baseline {
+    /// Numbers of the model file.
+    pub numbers: Numbers,
+    /// What is fitted.
+    pub free: Vec<BaseParameter>,
+}
+
+impl Baseline {
+    /// Numbers for fitted values.
+    pub fn numbers(&self, p: &[f64]) -> Numbers {
+        let mut numbers = self.numbers;
+        for (base, &value) in self.free.iter().zip(p) {
+            let q = &base.parameter;
+            let value = q.mean + BOUND * q.sd * ((value - q.mean) / (BOUND * q.sd)).tanh();
+            let slot = match base.role {
+                Role::A0 => &mut numbers.a0,
+                Role::A1 => &mut numbers.a1,
+                Role::V0 => &mut numbers.v0_m_s,
+                Role::Delta => &mut numbers.delta,
+                Role::A2 => &mut numbers.a2_s_per_m,
+                Role::Stiffness => &mut numbers.stiffness_n_per_m,
+                Role::Damping => &mut numbers.damping_n_s_per_m,
+                Role::Late => {
+                    numbers.late_ms = value;
+                    continue;
+                }
+            };
+            *slot = value.exp();
+        }
+        numbers
+    }
+}
+
+/// What the channel should have shown.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// All logs on end, N m.
+    pub shown_nm: Vec<f64>,
+    /// What the law made of each log.
+    pub observed: Vec<Observed>,
+}
+
+/// A fitted hypothesis.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Places of its terms in the list of all terms.
+    pub terms: Vec<usize>,
+    /// Values: baseline, then term after term.
+    pub p: Vec<f64>,
+    /// Residuals over their deviations; 0 where a point is not used.
+    pub r: Vec<f64>,
+    /// −ln of likelihood times prior, but for constants.
+    pub cost: f64,
+}
+
+/// Slopes of the residuals (negative) at some point.
+#[derive(Debug, Clone)]
+pub struct Slopes {
+    base: Vec<Vec<f64>>,
+    gain: Vec<f64>,
+}
+
+/// Logs, noise and baseline, ready for any hypothesis.
+pub struct Problem<'a> {
+    /// Logs.
+    pub logs: &'a [ContactLog],
+    /// The baseline.
+    pub baseline: &'a Baseline,
+    /// Every form of every effect.
+    pub terms: &'a [ContactTerm],
+    /// The noise model.
+    pub noise: Noise,
+}
+
+impl<'a> Problem<'a> {
+    /// For these logs; the noise model is that of the baseline as the model file has it.
+    pub fn new(logs: &'a [ContactLog], baseline: &'a Baseline, terms: &'a [ContactTerm]) -> Self {
+        let start: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
+        let mut problem = Self { logs, baseline, terms, noise: Noise::default() };
+        let contact = problem.contact(&baseline.numbers(&start), &Change::default());
+        let prediction = problem.predict(&[], &start);
+        problem.noise = Noise::new(logs, &contact.curve, contact.stiffness_n_per_m, &prediction);
+        problem
+    }
+
+    /// Measured values, all logs on end.
+    pub fn measured(&self) -> impl Iterator<Item = f64> + '_ {
+        self.logs.iter().flat_map(|log| log.friction_nm.iter().copied())
+    }
+
+    fn contact(&self, numbers: &Numbers, change: &Change) -> Contact {
+        let n = numbers;
+        let mut curve = Curve::new(|w| n.a0 + n.a1 * (-(w / n.v0_m_s).powf(n.delta)).exp());
+        if let Some(log_factor) = &change.log_curve {
+            curve.scale(log_factor);
+        }
+        let (k, c) = change.block.unwrap_or((n.stiffness_n_per_m, n.damping_n_s_per_m));
+        Contact {
+            curve,
+            stiffness_n_per_m: k,
+            damping_n_s_per_m: c,
+            branches_n_per_m: change.branches_n_per_m,
+            viscous: (n.a2_s_per_m, change.film_n_s_per_m),
+            ageing: change.ageing,
+        }
+    }
+
+    /// What the terms change.
+    pub fn change(&self, terms: &[usize], p: &[f64]) -> Change {
+        let mut change = Change::default();
+        let mut at = self.baseline.free.len();
+        for &term in terms {
+            let count = self.terms[term].parameters.len();
+            (self.terms[term].act)(&p[at..at + count], &mut change);
+            at += count;
+        }
+        change
+    }
+
+    /// What the channel should have shown.
+    pub fn predict(&self, terms: &[usize], p: &[f64]) -> Prediction {
+        self.predict_changed(&self.change(terms, p), p)
+    }
+
+    fn predict_changed(&self, change: &Change, p: &[f64]) -> Prediction {
+        let numbers = self.baseline.numbers(p);
+        let contact = self.contact(&numbers, change);
+        let mut shown_nm = Vec::with_capacity(self.logs.iter().map(ContactLog::len).sum());
+        let mut all = Vec::with_capacity(self.logs.len());
+        for (at, log) in self.logs.iter().enumerate() {
+            let step_s = log.grid.step_s;
+            let late = (1e-3 * numbers.late_ms + change.late_s) / step_s;
+            let ringing = change.mode.filter(|(hz, _)| hz * step_s < SIMULATED_MODE);
+            // What the channel adds is taken off first, so that it changes the observed slip too.
+            let seen = match (&change.shown_nm, ringing) {
+                (None, None) => shifted(&log.observed_nm, log.friction_late + late),
+                (added, ringing) => {
+                    let mut seen = log.friction_nm.clone();
+                    if let Some(added) = added {
+                        seen.iter_mut().zip(&added[at]).for_each(|(x, a)| *x -= a);
+                    }
+                    // A mode rings at its frequency; the force behind it is what is slower.
+                    let width = ringing.map_or(0.8, |(hz, _)| (0.4 / (hz * step_s)).clamp(0.8, 12.0));
+                    let delay = ringing.map_or(0.0, |(hz, zeta)| SecondOrder::delay_s(hz, zeta) / step_s);
+                    shifted(&gaussian(&seen, width, 0), log.friction_late + late + delay)
+                }
+            };
+            let force_n: Vec<f64> = seen.iter().map(|t| t / log.radius_m).collect();
+            let usual = rms(&log.root_speed_m_s);
+            let drive = Drive {
+                step_s,
+                root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
+                load_n: &log.load_n,
+                force_n: &force_n,
+                log_factor: change.log_factor.as_ref().map(|m| m[at].as_slice()),
+                slip_threshold_m_s: (SLOWEST_SLIP * usual).max(SLIP_NOISES * log.speed_noise_m_s).max(1e-9),
+                noise: (
+                    log.speed_noise_m_s.max(DRIFT * usual),
+                    log.friction_noise_nm.max(1e-12) / log.radius_m,
+                ),
+            };
+            let observed = observe(&contact, &drive);
+            let mut torque: Vec<f64> = observed.force_n.iter().map(|f| f * log.radius_m).collect();
+            if let Some((hz, zeta)) = ringing {
+                let mut mode = SecondOrder::new(hz, zeta, torque.first().copied().unwrap_or(0.0));
+                torque.iter_mut().for_each(|t| *t = mode.step(step_s, *t));
+            }
+            let mut torque = shifted(&torque, -log.friction_late - late);
+            if let Some(added) = &change.shown_nm {
+                torque.iter_mut().zip(&added[at]).for_each(|(t, a)| *t += a);
+            }
+            if let Some((low, high)) = change.ends_nm {
+                torque.iter_mut().for_each(|t| *t = t.clamp(low, high));
+            }
+            shown_nm.extend(torque);
+            all.push(observed);
+        }
+        Prediction { shown_nm, observed: all }
+    }
+
+    /// Residuals over their deviations.
+    pub fn residuals(&self, terms: &[usize], p: &[f64]) -> Vec<f64> {
+        self.scaled(&self.predict(terms, p).shown_nm)
+    }
+
+    fn scaled(&self, shown: &[f64]) -> Vec<f64> {
+        let usable = self.logs.iter().flat_map(|log| log.usable.iter());
+        self.measured()
+            .zip(shown)
+            .zip(&self.noise.deviation)
+            .zip(usable)
+            .map(|(((y, x), s), used)| if *used { (y - x) / s } else { 0.0 })
+            .collect()
+    }
+
+    /// All parameters of a hypothesis.
+    pub fn parameters<'s>(&'s self, terms: &'s [usize]) -> impl Iterator<Item = &'s Parameter> + 's {
+        let base = self.baseline.free.iter().map(|b| &b.parameter);
+        base.chain(terms.iter().flat_map(|t| self.terms[*t].parameters.iter()))
+    }
+
+    fn cost(&self, terms: &[usize], p: &[f64], r: &[f64]) -> f64 {
+        let prior: f64 = self
+            .parameters(terms)
+            .zip(p)
+            .map(|(q, x)| ((x - q.mean) / self.width(q, TYPICAL_SCALE)).powi(2))
+            .sum();
+        self.misfit(r) + 0.5 * prior
+    }
+
+    fn width(&self, q: &Parameter, scale: f64) -> f64 {
+        if q.amplitude { q.sd * scale } else { q.sd }
+    }
+
+    /// −ln likelihood, but for constants.
+    pub fn misfit(&self, r: &[f64]) -> f64 {
+        0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.noise.temper
+    }
+
+    /// −∂r/∂p at a point, a column for each parameter.
+    pub fn jacobian(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Vec<f64>> {
+        let slopes = self.slopes(terms, p, r);
+        self.jacobian_with(&slopes, terms, p, r)
+    }
+
+    /// Slopes that change little while other parameters move: those of the baseline, and of ln friction as a whole.
+    pub fn slopes(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Slopes {
+        const STEP: f64 = 0.01;
+        let base = (0..self.baseline.free.len())
+            .into_par_iter()
+            .map(|i| self.difference(terms, p, r, i, self.baseline.free[i].parameter.step))
+            .collect();
+        let mut change = self.change(terms, p);
+        match &mut change.log_factor {
+            Some(m) => m.iter_mut().flatten().for_each(|m| *m += STEP),
+            none => *none = Some(self.logs.iter().map(|log| vec![STEP; log.len()]).collect()),
+        }
+        let moved = self.scaled(&self.predict_changed(&change, p).shown_nm);
+        Slopes { base, gain: moved.iter().zip(r).map(|(a, b)| (b - a) / STEP).collect() }
+    }
+
+    fn difference(&self, terms: &[usize], p: &[f64], r: &[f64], i: usize, step: f64) -> Vec<f64> {
+        let mut q = p.to_vec();
+        q[i] += step;
+        self.residuals(terms, &q).iter().zip(r).map(|(a, b)| (b - a) / step).collect()
+    }
+
+    /// As [`Self::jacobian`], with slopes taken near by.
+    pub fn jacobian_with(&self, slopes: &Slopes, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Vec<f64>> {
+        let mut columns = slopes.base.clone();
+        let mut at = columns.len();
+        for count in 1..=terms.len() {
+            let own = self.terms[terms[count - 1]].parameters.len();
+            at += own;
+            columns.extend(self.columns_of(slopes, terms, p, r, terms[count - 1], at - own));
+        }
+        columns
+    }
+
+    /// Columns of the last term alone.
+    pub fn term_columns(&self, slopes: &Slopes, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Vec<f64>> {
+        let Some(&last) = terms.last() else { return Vec::new() };
+        self.columns_of(slopes, terms, p, r, last, p.len() - self.terms[last].parameters.len())
+    }
+
+    /// Columns of a term whose parameters begin at a place.
+    fn columns_of(
+        &self,
+        slopes: &Slopes,
+        terms: &[usize],
+        p: &[f64],
+        r: &[f64],
+        term: usize,
+        at: usize,
+    ) -> Vec<Vec<f64>> {
+        let term = &self.terms[term];
+        match &term.columns {
+            // All columns of ln friction act through one gain.
+            Some(own) => own
+                .iter()
+                .map(|c| c.iter().flatten().zip(&slopes.gain).map(|(x, g)| x * g).collect())
+                .collect(),
+            None => (0..term.parameters.len())
+                .into_par_iter()
+                .map(|i| self.difference(terms, p, r, at + i, term.parameters[i].step))
+                .collect(),
+        }
+    }
+
+    /// Weights of iterated least squares.
+    pub fn weights(&self, r: &[f64]) -> Vec<f64> {
+        r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / self.noise.temper).collect()
+    }
+
+    /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
+    /// are taken once at the start: what is minimised is evaluated anew in each iteration all the same.
+    pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, slopes: Option<&Slopes>) -> Fit {
+        let parameters: Vec<&Parameter> = self.parameters(terms).collect();
+        let n = parameters.len();
+        let mut p = start;
+        let mut r = self.residuals(terms, &p);
+        let mut cost = self.cost(terms, &p, &r);
+        let mut damping = 1e-3;
+        let own = slopes.is_none().then(|| self.slopes(terms, &p, &r));
+        let Some(slopes) = slopes.or(own.as_ref()) else { return Fit { terms: terms.to_vec(), p, r, cost } };
+        for _ in 0..iterations {
+            let j = self.jacobian_with(slopes, terms, &p, &r);
+            let w = self.weights(&r);
+            let (mut h, mut g) = normal_equations(&j, &w, &r);
+            for (i, q) in parameters.iter().enumerate() {
+                let sd = self.width(q, TYPICAL_SCALE);
+                h[(i, i)] += 1.0 / (sd * sd);
+                g[i] -= (p[i] - q.mean) / (sd * sd);
+            }
+            let mut found = None;
+            for _ in 0..4 {
+                let mut damped = h.clone();
+                for i in 0..n {
+                    damped[(i, i)] *= 1.0 + damping;
+                }
+                let lower: Vec<f64> = parameters.iter().zip(&p).map(|(q, x)| q.lower - x).collect();
+                let d = linear::solve_bounded(&damped, &g, &lower);
+                let excess = d.iter().zip(&parameters).map(|(d, q)| d.abs() / q.reach).fold(1.0, f64::max);
+                let next: Vec<f64> = p
+                    .iter()
+                    .zip(d.iter())
+                    .zip(&parameters)
+                    .map(|((p, d), q)| (p + d / excess).max(q.lower))
+                    .collect();
+                let next_r = self.residuals(terms, &next);
+                let next_cost = self.cost(terms, &next, &next_r);
+                if next_cost < cost {
+                    found = Some((next, next_r, next_cost));
+                    break;
+                }
+                damping = (10.0 * damping).max(1e-2);
+            }
+            let Some((next, next_r, next_cost)) = found else { break };
+            let gained = cost - next_cost;
+            (p, r, cost) = (next, next_r, next_cost);
+            damping = (0.3 * damping).max(1e-6);
+            // Half a unit of log evidence changes no decision.
+            if gained < 0.5 {
+                break;
+            }
+        }
+        Fit { terms: terms.to_vec(), p, r, cost }
+    }
+
+    /// Points at which the search over a term starts, beside the values of the others.
+    pub fn starts(&self, others: &Fit, term: usize) -> Vec<Vec<f64>> {
+        match &self.terms[term].starts {
+            Starts::At(points) => points.clone(),
+            Starts::BestOf(points, count) => {
+                let terms: Vec<usize> = others.terms.iter().copied().chain([term]).collect();
+                let mut tried: Vec<(f64, &Vec<f64>)> = points
+                    .par_iter()
+                    .map(|point| {
+                        let p = [others.p.as_slice(), point.as_slice()].concat();
+                        (self.misfit(&self.residuals(&terms, &p)), point)
+                    })
+                    .collect();
+                tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+                tried.into_iter().take(*count).map(|(_, point)| point.clone()).collect()
+            }
+        }
+    }
+
+    /// ln evidence by Laplace's method, averaged over the scale of the amplitudes.
+    pub fn log_evidence(&self, fit: &Fit) -> f64 {
+        let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
+        let (h, _) = normal_equations(&j, &self.weights(&fit.r), &fit.r);
+        let parameters: Vec<&Parameter> = self.parameters(&fit.terms).collect();
+        let misfit = self.misfit(&fit.r);
+        let at_bound = |i: usize| fit.p[i] <= parameters[i].lower;
+        let active: Vec<usize> = (0..fit.p.len()).filter(|i| !at_bound(*i)).collect();
+        log_mean_exp(SCALES.iter().map(|scale| {
+            let sd = |i: usize| self.width(parameters[i], *scale);
+            let prior: f64 =
+                (0..fit.p.len()).map(|i| ((fit.p[i] - parameters[i].mean) / sd(i)).powi(2)).sum();
+            let scaled = DMatrix::from_fn(active.len(), active.len(), |a, b| {
+                let (a, b) = (active[a], active[b]);
+                h[(a, b)] * sd(a) * sd(b) + f64::from(u8::from(a == b))
+            });
+            -misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
+        }))
+    }
+}
+
+/// Scales of the amplitudes' priors: effects of 3 to 100 % are equally expected.
+pub const SCALES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
+/// The scale that the search itself uses.
+pub const TYPICAL_SCALE: f64 = 0.3;
+
+/// ln of the mean of exponentials.
+pub fn log_mean_exp(values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    largest + (values.iter().map(|x| (x - largest).exp()).sum::<f64>() / values.len() as f64).ln()
+}

@@ -1,0 +1,274 @@
+//! Which effects the contact's balance asks for: every single one, then pairs and triples from linear tables.
+//!
+//! 1. every form of every effect is fitted beside the baseline, a few iterations, and the best ones on;
+//! 2. at each of the best, one Gram matrix over the columns of all others gives the linearised evidence of each set with one
+//!    more; the best sets are refitted;
+//! 3. the noise's sources and the effective sample size are fitted to the residuals of the best set, and the best sets
+//!    are fitted again with them.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::noise::MODEL_FORM;
+use super::problem::{Fit, Problem, SCALES, Slopes, log_mean_exp};
+use crate::identify::linear::{self, normal_equations};
+
+/// A hypothesis with its ln evidence.
+#[derive(Debug, Clone)]
+pub struct Ranked {
+    /// ln evidence.
+    pub log_evidence: f64,
+    /// The fit.
+    pub fit: Fit,
+}
+
+/// Sets from which a larger one is looked for.
+const PARENTS: usize = 5;
+/// Larger sets refitted, of those that the tables rank.
+const CHILDREN: usize = 8;
+/// Sets kept for the last comparison.
+const FINALISTS: usize = 8;
+
+/// A larger set is looked for where each part of the smaller one changes the prediction by this share of the signal: half
+/// of what the model's form is known to.
+const WORTH: f64 = 0.5 * MODEL_FORM;
+/// Sizes are taken where the channel is known to this many deviations of its sensor's noise.
+const WELL_KNOWN: f64 = 10.0;
+
+/// How much the prediction changes, relative to the signal, when each of a set's terms is taken out and the others are
+/// fitted again.
+pub fn sizes(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+    let counts: Vec<usize> = fit.terms.iter().map(|t| problem.terms[*t].parameters.len()).collect();
+    let base = problem.baseline.free.len();
+    (0..fit.terms.len())
+        .into_par_iter()
+        .map(|out| {
+            let from = base + counts[..out].iter().sum::<usize>();
+            let mut p = fit.p.clone();
+            p.drain(from..from + counts[out]);
+            let mut terms = fit.terms.clone();
+            terms.remove(out);
+            let without = problem.fit(&terms, p, 4, None);
+            difference(problem, &fit.r, &without.r)
+        })
+        .collect()
+}
+
+/// RMS of the difference of two predictions over that of the signal, where the channel is well known.
+pub fn difference(problem: &Problem<'_>, a: &[f64], b: &[f64]) -> f64 {
+    let limit = WELL_KNOWN * problem.logs.iter().map(|log| log.friction_noise_nm).fold(0.0, f64::max);
+    let (mut sum, mut count, mut signal, mut all) = (0.0, 0.0f64, 0.0, 0.0f64);
+    for (((a, b), s), y) in a.iter().zip(b).zip(&problem.noise.deviation).zip(problem.measured()) {
+        signal += y * y;
+        all += 1.0;
+        if *s < limit && *a != 0.0 {
+            sum += ((a - b) * s).powi(2);
+            count += 1.0;
+        }
+    }
+    if signal > 0.0 { (sum / count.max(1.0) / (signal / all)).sqrt() } else { 0.0 }
+}
+
+/// What the search found, best first; the baseline is among them.
+pub struct Found {
+    /// Sets with their evidence.
+    pub ranked: Vec<Ranked>,
+}
+
+/// Searches.
+pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found {
+    let base = baseline(problem);
+    told("single causes");
+    let singles = singles(problem, &base);
+    let mut all: Vec<Fit> = singles.iter().take(FINALISTS).cloned().collect();
+    all.push(base.clone());
+    let mut parents: Vec<Fit> = singles.into_iter().take(PARENTS).collect();
+    for what in ["pairs of causes", "three causes at once"] {
+        // A set whose parts are too small to matter has no larger one worth a search.
+        let worth = parents.first().is_some_and(|best| sizes(problem, best).iter().all(|s| *s > WORTH));
+        if !worth {
+            break;
+        }
+        told(what);
+        let children = children(problem, &parents);
+        parents = children.iter().take(2).cloned().collect();
+        all.extend(children.into_iter().take(FINALISTS));
+    }
+    told("evidence");
+    let mut ranked = rank(problem, all);
+    for _ in 0..2 {
+        problem.noise.refit(problem.logs, &ranked[0].fit.r);
+        let mut kept: Vec<Fit> = ranked.iter().take(FINALISTS).map(|r| r.fit.clone()).collect();
+        // The baseline and the best set of each size stay in the comparison.
+        for size in 0..=3 {
+            if !kept.iter().any(|fit| fit.terms.len() == size) {
+                kept.extend(ranked.iter().find(|r| r.fit.terms.len() == size).map(|r| r.fit.clone()));
+            }
+        }
+        let again: Vec<Fit> =
+            kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 4, None)).collect();
+        ranked = rank(problem, again);
+    }
+    Found { ranked }
+}
+
+fn baseline(problem: &Problem<'_>) -> Fit {
+    let start: Vec<f64> = problem.baseline.free.iter().map(|b| b.parameter.mean).collect();
+    let near = problem.fit(&[], start, 6, None);
+    problem.fit(&[], near.p, 6, None)
+}
+
+fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let mut seen: Vec<Vec<usize>> = Vec::new();
+    fits.retain(|fit| {
+        let mut terms = fit.terms.clone();
+        terms.sort_unstable();
+        let new = !seen.contains(&terms);
+        if new {
+            seen.push(terms);
+        }
+        new
+    });
+    fits
+}
+
+fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]) -> Vec<Fit> {
+    for &(keep, iterations) in rounds {
+        fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        fits.truncate(keep);
+        fits = fits.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, iterations, None)).collect();
+    }
+    unique(fits)
+}
+
+fn singles(problem: &Problem<'_>, base: &Fit) -> Vec<Fit> {
+    let slopes = problem.slopes(&[], &base.p, &base.r);
+    let starts: Vec<(usize, Vec<f64>)> = (0..problem.terms.len())
+        .flat_map(|term| problem.starts(base, term).into_iter().map(move |start| (term, start)))
+        .collect();
+    let first: Vec<Fit> = starts
+        .into_par_iter()
+        .map(|(term, start)| problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Some(&slopes)))
+        .collect();
+    improved(problem, first, &[(14, 3), (9, 5)])
+}
+
+/// Linearised gain in evidence of each term beside a fit, with the values at which it starts.
+fn table(problem: &Problem<'_>, parent: &Fit, slopes: &Slopes) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
+    let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
+    let w = problem.weights(&parent.r);
+    let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
+    let others: Vec<usize> = (0..problem.terms.len()).filter(|t| !has(problem.terms[*t].effect)).collect();
+    // Columns of each other term, and the points that they stand for where it is not linear.
+    let blocks: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> = others
+        .par_iter()
+        .map(|&term| {
+            let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
+            let q = &problem.terms[term];
+            let linear = q.parameters.iter().all(|p| p.amplitude);
+            if linear {
+                let p = [parent.p.as_slice(), &vec![0.0; q.parameters.len()]].concat();
+                let j = problem.term_columns(slopes, &terms, &p, &parent.r);
+                (j, Vec::new())
+            } else {
+                let starts = problem.starts(parent, term);
+                let columns = starts
+                    .iter()
+                    .map(|start| {
+                        let r = problem.residuals(&terms, &[parent.p.as_slice(), start].concat());
+                        r.iter().zip(&parent.r).map(|(a, b)| b - a).collect()
+                    })
+                    .collect();
+                (columns, starts)
+            }
+        })
+        .collect();
+    let parameters: Vec<_> = problem.parameters(&parent.terms).cloned().collect();
+    let mut out = Vec::new();
+    let base_count = j0.len();
+    let mut all = j0;
+    let mut places = Vec::new();
+    for (columns, _) in &blocks {
+        places.push(all.len()..all.len() + columns.len());
+        all.extend(columns.iter().cloned());
+    }
+    let (h, g) = normal_equations(&all, &w, &parent.r);
+    let gain = |columns: &[usize], sd: &dyn Fn(usize) -> f64| -> (f64, DVector<f64>) {
+        let index: Vec<usize> = (0..base_count).chain(columns.iter().copied()).collect();
+        let width = |i: usize| if i < base_count { parameters[i].sd } else { sd(index[i]) };
+        let a = DMatrix::from_fn(index.len(), index.len(), |i, j| {
+            h[(index[i], index[j])] * width(i) * width(j) + f64::from(u8::from(i == j))
+        });
+        let b = DVector::from_fn(index.len(), |i, _| {
+            let off =
+                if i < base_count { (parent.p[i] - parameters[i].mean) / (width(i) * width(i)) } else { 0.0 };
+            (g[index[i]] - off) * width(i)
+        });
+        let factor = linear::factor(&a);
+        let x = factor.solve(&b);
+        let d = DVector::from_fn(index.len(), |i, _| x[i] * width(i));
+        (0.5 * b.dot(&x) - 0.5 * linear::log_determinant(&factor), d)
+    };
+    let none = gain(&[], &|_| 1.0).0;
+    for ((&term, (_, starts)), place) in others.iter().zip(&blocks).zip(places) {
+        let q = &problem.terms[term];
+        if starts.is_empty() {
+            let columns: Vec<usize> = place.clone().collect();
+            let sd = |scale: f64| move |i: usize| q.parameters[i - place.start].sd * scale;
+            let tried: Vec<(f64, DVector<f64>)> = SCALES.iter().map(|s| gain(&columns, &sd(*s))).collect();
+            let value = log_mean_exp(tried.iter().map(|t| t.0)) - none;
+            let best = tried.iter().max_by(|a, b| a.0.total_cmp(&b.0)).expect("there are scales");
+            let sizes = best.1.rows(base_count, q.parameters.len());
+            let over = sizes.iter().zip(&q.parameters).map(|(x, p)| x.abs() / p.sd).fold(1.0, f64::max);
+            let start = sizes.iter().zip(&q.parameters).map(|(x, p)| (x / over).max(p.lower)).collect();
+            out.push((value, term, vec![start]));
+        } else {
+            // Each point is a direction of its own.
+            let tried = place.zip(starts).map(|(i, start)| (gain(&[i], &|_| 1.0).0 - none, start.clone()));
+            let mut tried: Vec<(f64, Vec<f64>)> = tried.collect();
+            tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let value = tried.first().map_or(f64::NEG_INFINITY, |t| t.0);
+            out.push((value, term, tried.into_iter().take(2).map(|t| t.1).collect()));
+        }
+    }
+    out
+}
+
+fn children(problem: &Problem<'_>, parents: &[Fit]) -> Vec<Fit> {
+    let mut candidates: Vec<(f64, Vec<usize>, Vec<Vec<f64>>)> = Vec::new();
+    for parent in parents {
+        let level = problem.log_evidence(parent);
+        let slopes = problem.slopes(&parent.terms, &parent.p, &parent.r);
+        for (gain, term, starts) in table(problem, parent, &slopes) {
+            let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
+            let starts = starts.into_iter().map(|s| [parent.p.as_slice(), &s].concat()).collect();
+            candidates.push((level + gain, terms, starts));
+        }
+    }
+    candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut seen: Vec<Vec<usize>> = Vec::new();
+    candidates.retain(|(_, terms, _)| {
+        let mut sorted = terms.clone();
+        sorted.sort_unstable();
+        let new = !seen.contains(&sorted);
+        seen.push(sorted);
+        new
+    });
+    let starts: Vec<(Vec<usize>, Vec<f64>)> = candidates
+        .into_iter()
+        .take(CHILDREN)
+        .flat_map(|(_, terms, starts)| starts.into_iter().map(move |s| (terms.clone(), s)))
+        .collect();
+    let first: Vec<Fit> =
+        starts.into_par_iter().map(|(terms, start)| problem.fit(&terms, start, 2, None)).collect();
+    improved(problem, first, &[(6, 5)])
+}
+
+fn rank(problem: &Problem<'_>, fits: Vec<Fit>) -> Vec<Ranked> {
+    let fits = unique(fits);
+    let mut ranked: Vec<Ranked> =
+        fits.into_par_iter().map(|fit| Ranked { log_evidence: problem.log_evidence(&fit), fit }).collect();
+    ranked.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    ranked
+}

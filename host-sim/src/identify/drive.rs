@@ -1,0 +1,281 @@
+//! The drive's balance: torque of M2 (or a force), less the friction torque, against inertia and bearing.
+//!
+//! T2 − T_f = J ω̇ + T_c sgn ω + b ω + lateness of the channels
+//!
+//! Every term goes through one Gaussian, whose derivatives give ω and ω̇ from the angle; it is as narrow as the angle's
+//! noise allows. Rows near standstill are left out: there the bearing's friction is a reaction.
+
+use super::balance::Balance;
+use super::contact::log::ContactLog;
+use super::contact::log::unwrapped;
+use super::filters::{gaussian, local_maximum, rms};
+use super::grid::Grid;
+use super::noise;
+use super::term::Parameter;
+use crate::files::log::{Log, LogKind};
+use crate::input_error::InputError;
+
+/// Widths of the filter that are tried, samples.
+const WIDTHS: [f64; 6] = [1.5, 2.0, 3.0, 4.0, 6.0, 9.0];
+/// The drive stands where it is slower than this share of its usual speed, …
+const STANDSTILL: f64 = 0.01;
+/// … or than so many deviations of the speed's noise.
+const STANDSTILL_NOISES: f64 = 5.0;
+/// Rows are taken every so many samples for each width of the filter: closer ones say the same.
+const ROWS_PER_WIDTH: f64 = 0.5;
+/// The channels of a log are sampled within this time of each other, s.
+const LATE_S: f64 = 1e-4;
+/// Gain of the friction channel is known within 0.5 %.
+const GAIN: f64 = 5e-3;
+/// Names of the base parameters' places.
+pub const INERTIA: usize = 0;
+/// Place of the Coulomb torque.
+pub const COULOMB: usize = 1;
+
+/// Signals of a drive.
+#[derive(Debug, Clone)]
+pub struct DriveLog {
+    /// The log's name.
+    pub source: String,
+    /// The grid.
+    pub grid: Grid,
+    /// Torque or force.
+    pub effort: Vec<f64>,
+    /// Angle or position.
+    pub position: Vec<f64>,
+    /// Friction torque on the disc, taken ahead by its sensor's delay; `None` where nothing is pressed.
+    pub friction: Option<Vec<f64>>,
+    /// Normal force.
+    pub load_n: Option<Vec<f64>>,
+    /// Points that take part.
+    pub usable: Vec<bool>,
+    /// Filtered: speed, its derivative, the filter's width in samples.
+    pub speed: Vec<f64>,
+    /// Acceleration.
+    pub acceleration: Vec<f64>,
+    /// Width of the filter, samples.
+    pub width: f64,
+}
+
+impl DriveLog {
+    /// From a drive log.
+    ///
+    /// # Errors
+    /// Where a column is missing.
+    pub fn new(log: &Log, inertia: f64) -> Result<Self, InputError> {
+        let signals = log.drive()?;
+        let grid = Grid::new(signals.time_s);
+        let rotary = log.kind()? == LogKind::RotaryDrive;
+        let raw = if rotary { unwrapped(signals.position) } else { signals.position.to_vec() };
+        let position = grid.channel(signals.time_s, &raw);
+        let effort = grid.channel(signals.time_s, signals.effort);
+        let usable = grid.covered.clone();
+        Ok(Self::made(log.source.clone(), grid, effort, position, None, None, usable, inertia))
+    }
+
+    /// The drive of a contact log; `None` where its torque is not logged.
+    pub fn of_contact(log: &ContactLog, inertia: f64) -> Option<Self> {
+        let effort = log.m2_torque_nm.clone()?;
+        let friction = super::filters::shifted(&log.friction_nm, log.friction_late);
+        let load = Some(log.load_n.clone());
+        let (grid, usable) = (log.grid.clone(), log.usable.clone());
+        Some(Self::made(
+            log.source.clone(),
+            grid,
+            effort,
+            log.angle_rad.clone(),
+            Some(friction),
+            load,
+            usable,
+            inertia,
+        ))
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "one for each signal")]
+    fn made(
+        source: String,
+        grid: Grid,
+        effort: Vec<f64>,
+        position: Vec<f64>,
+        friction: Option<Vec<f64>>,
+        load_n: Option<Vec<f64>>,
+        usable: Vec<bool>,
+        inertia: f64,
+    ) -> Self {
+        // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
+        let (angle_noise, effort_noise) =
+            (noise::standard_deviation(&position), noise::standard_deviation(&effort));
+        let root_pi = std::f64::consts::PI.sqrt();
+        let fits = |width: f64| {
+            let acceleration = angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2);
+            inertia * acceleration < 0.5 * effort_noise * (0.5 / (root_pi * width)).sqrt()
+        };
+        let width = WIDTHS.into_iter().find(|w| fits(*w)).unwrap_or(WIDTHS[5]).max(if friction.is_some() {
+            3.0
+        } else {
+            0.0
+        });
+        let dt = grid.step_s;
+        let speed = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
+        let acceleration = gaussian(&position, width, 2).iter().map(|d| d / (dt * dt)).collect();
+        Self { source, grid, effort, position, friction, load_n, usable, speed, acceleration, width }
+    }
+
+    /// Points of the grid.
+    pub fn len(&self) -> usize {
+        self.grid.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.grid.is_empty()
+    }
+
+    /// A signal through the balance's filter.
+    pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
+        gaussian(values, self.width, 0)
+    }
+}
+
+/// Usual sizes over the training logs.
+#[derive(Debug, Clone, Copy)]
+pub struct DriveScales {
+    /// Speed.
+    pub speed: f64,
+    /// Torque or force.
+    pub effort: f64,
+    /// Of what is left of it when the friction torque is taken off.
+    pub own: f64,
+    /// Longest log, s.
+    pub time_s: f64,
+    /// Usual load, N.
+    pub load_n: f64,
+}
+
+impl DriveScales {
+    /// Of the training logs.
+    pub fn new(logs: &[DriveLog]) -> Self {
+        let usual = |of: &dyn Fn(&DriveLog) -> f64| rms(&logs.iter().map(of).collect::<Vec<_>>()).max(1e-12);
+        let own = |log: &DriveLog| rms(&response(log));
+        Self {
+            speed: usual(&|log| rms(&log.speed)),
+            effort: usual(&|log| rms(&log.effort)),
+            own: usual(&own),
+            time_s: logs.iter().filter_map(|log| log.grid.time_s.last().copied()).fold(1e-9, f64::max),
+            load_n: usual(&|log| log.load_n.as_ref().map_or(0.0, |n| rms(n))),
+        }
+    }
+}
+
+/// Effort less friction, filtered.
+pub fn response(log: &DriveLog) -> Vec<f64> {
+    let y: Vec<f64> = match &log.friction {
+        Some(friction) => log.effort.iter().zip(friction).map(|(t, f)| t - f).collect(),
+        None => log.effort.clone(),
+    };
+    log.filtered(&y)
+}
+
+/// Direction of motion, −1 to 1, filtered.
+pub fn direction(log: &DriveLog, usual_speed: f64) -> Vec<f64> {
+    let sign: Vec<f64> = log.speed.iter().map(|v| (v / (0.5 * STANDSTILL * usual_speed)).tanh()).collect();
+    log.filtered(&sign)
+}
+
+/// What is known of the drive beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct DrivePrior {
+    /// Inertia or mass, and whether the rig file says it.
+    pub inertia: Option<f64>,
+    /// Coulomb torque of the bearing.
+    pub coulomb: Option<f64>,
+    /// Viscous friction.
+    pub viscous: Option<f64>,
+}
+
+/// The balance of these logs. `friction` replaces what the logs have, where a sensor fault is taken off.
+pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> Balance {
+    let contact = logs.iter().any(|log| log.friction.is_some());
+    let concat = |of: &dyn Fn(&DriveLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let rate = |log: &DriveLog, values: &[f64]| -> Vec<f64> {
+        gaussian(values, log.width, 1).iter().map(|d| d / log.grid.step_s).collect()
+    };
+    let wide = |name: &str, mean: f64, sd: f64| Parameter {
+        amplitude: false,
+        mean,
+        ..Parameter::amplitude(name, sd)
+    };
+    let (v, own) = (scales.speed, scales.own);
+    let acceleration = concat(&|log| log.acceleration.clone());
+    let usual_acceleration = rms(&acceleration).max(1e-12);
+    let mut base = vec![
+        // Inertia within 20 % of the rig file, or anything that the effort could move.
+        (
+            prior.inertia.map_or(wide("inertia", 0.0, 10.0 * scales.effort / usual_acceleration), |j| {
+                wide("inertia", j, 0.2 * j)
+            }),
+            acceleration,
+        ),
+        (
+            wide(
+                "coulomb",
+                prior.coulomb.unwrap_or(0.3 * own),
+                prior.coulomb.map_or(own, |c| c.max(0.3 * own)),
+            ),
+            concat(&|log| direction(log, v)),
+        ),
+        (
+            wide(
+                "viscous",
+                prior.viscous.unwrap_or(0.0),
+                prior.viscous.map_or(own / v, |c| (2.0 * c).max(0.2 * own / v)),
+            ),
+            concat(&|log| log.speed.clone()),
+        ),
+        (
+            wide("effort_late_s", 0.0, LATE_S),
+            concat(&|log| rate(log, &log.effort).iter().map(|d| -d).collect()),
+        ),
+    ];
+    if contact {
+        let friction = |log: &DriveLog| log.friction.clone().unwrap_or_else(|| vec![0.0; log.len()]);
+        base.push((wide("friction_late_s", 0.0, 2.0 * LATE_S), concat(&|log| rate(log, &friction(log)))));
+        base.push((wide("friction_gain", 0.0, GAIN), concat(&|log| log.filtered(&friction(log)))));
+    }
+    let mut deviation = Vec::new();
+    let mut used = Vec::new();
+    let mut starts = Vec::new();
+    let mut row_step_s = f64::INFINITY;
+    for log in logs {
+        let from = deviation.len();
+        starts.push(from);
+        let change = |values: &[f64]| {
+            local_maximum(&gaussian(values, log.width, 1).iter().map(|d| d.abs()).collect::<Vec<_>>(), 2)
+        };
+        let effort_change = change(&log.effort);
+        let friction_change = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| change(f));
+        let white = noise::standard_deviation(&log.effort)
+            .hypot(log.friction.as_ref().map_or(0.0, |f| noise::standard_deviation(f)));
+        let filtered_noise = white * (0.5 / (std::f64::consts::PI.sqrt() * log.width)).sqrt();
+        for i in 0..log.len() {
+            let n = [filtered_noise, 2e-3 * own, 0.1 * effort_change[i], 0.1 * friction_change[i]];
+            deviation.push(n.iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12));
+        }
+        let speed_noise = noise::standard_deviation(&log.position) / (log.grid.step_s * log.width);
+        let standstill = (STANDSTILL * v).max(STANDSTILL_NOISES * speed_noise);
+        let stands: Vec<f64> = (0..log.len())
+            .map(|i| f64::from(u8::from(log.speed[i].abs() < standstill || !log.usable[i])))
+            .collect();
+        let near = local_maximum(&stands, (2.0 * log.width).ceil() as usize);
+        let every = (ROWS_PER_WIDTH * log.width).round().max(1.0) as usize;
+        let border = (4.0 * log.width).ceil() as usize;
+        row_step_s = row_step_s.min(every as f64 * log.grid.step_s);
+        used.extend(
+            (border..log.len().saturating_sub(border))
+                .step_by(every)
+                .filter(|i| near[*i] == 0.0)
+                .map(|i| from + i),
+        );
+    }
+    Balance { response: concat(&response), base, deviation, used, temper: 3.0, row_step_s, starts }
+}

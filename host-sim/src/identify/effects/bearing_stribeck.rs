@@ -1,0 +1,38 @@
+//! `bearing_stribeck`: the bearing's friction falls with speed near zero.
+
+use super::{DriveView, Effect};
+use crate::identify::balance::Alternative;
+use crate::identify::drive::direction;
+use crate::identify::term::Parameter;
+
+/// The effect.
+pub struct BearingStribeck;
+
+/// Stribeck speeds that are tried, in shares of the usual speed.
+const SPEEDS: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.8];
+
+impl Effect for BearingStribeck {
+    fn id(&self) -> &'static str {
+        "bearing_stribeck"
+    }
+
+    fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
+        let s = view.scales;
+        let shape = |share: f64| {
+            let at = share * s.speed;
+            let column = view.logs.iter().flat_map(|log| {
+                let fall: Vec<f64> =
+                    direction(log, s.speed).iter().zip(&log.speed).map(|(d, v)| d * (-v.abs() / at).exp()).collect();
+                log.filtered(&fall)
+            });
+            let parameters = vec![Parameter::positive("static_excess", s.own)];
+            Alternative {
+                form: format!("below {at:.3}"),
+                constants: vec![("stribeck_speed".to_string(), at)],
+                log_prior: -(SPEEDS.len() as f64).ln(),
+                ..Alternative::columns("bearing_stribeck", parameters, vec![column.collect()])
+            }
+        };
+        SPEEDS.into_iter().map(shape).collect()
+    }
+}

@@ -1,0 +1,48 @@
+//! `disc_angle`: µ varies with the disc's angle, a few orders per revolution.
+
+use super::{ContactView, Effect};
+use crate::identify::contact::change::ContactTerm;
+use crate::identify::term::{Column, Parameter};
+
+/// The effect.
+pub struct DiscAngle;
+
+/// Orders per revolution.
+const ORDERS: usize = 8;
+
+impl Effect for DiscAngle {
+    fn id(&self) -> &'static str {
+        "disc_angle"
+    }
+
+    fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
+        let wave = |order: usize, sine: bool, only: Option<usize>| -> Column {
+            let of = |(at, log): (usize, &super::ContactLog)| -> Vec<f64> {
+                if only.is_some_and(|only| !view.training || only != at) {
+                    return vec![0.0; log.len()];
+                }
+                let phase = |a: &f64| order as f64 * a;
+                log.angle_rad.iter().map(|a| if sine { phase(a).sin() } else { phase(a).cos() }).collect()
+            };
+            view.logs.iter().enumerate().map(of).collect()
+        };
+        // An incremental encoder has its zero where it was switched on: the pattern may be turned from log to log.
+        let forms = [("", vec![None]), ("own_origin", (0..view.train_count).map(Some).collect())];
+        forms
+            .into_iter()
+            .map(|(form, logs): (_, Vec<Option<usize>>)| {
+                let (mut columns, mut parameters) = (Vec::new(), Vec::new());
+                for only in logs {
+                    let log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
+                    for order in 1..=ORDERS {
+                        for (name, sine) in [("cos", false), ("sin", true)] {
+                            columns.push(wave(order, sine, only));
+                            parameters.push(Parameter::amplitude(format!("{name}{order}{log}"), 1.0 / order as f64));
+                        }
+                    }
+                }
+                ContactTerm::factor(self.id(), form, columns, parameters)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,114 @@
+//! The library: one file for each effect holds all that is known of it; this list is the only other place that names it.
+
+pub mod coordinates;
+pub mod waves;
+
+use crate::identify::balance::{Alternative, Balance};
+use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::log::ContactLog;
+use crate::identify::drive::{DriveLog, DriveScales};
+use crate::identify::press::{PressLog, PressScales};
+use coordinates::Coordinates;
+
+/// The logs of a contact, and what the effects' columns are scaled with: always that of the training logs.
+pub struct ContactView<'a> {
+    /// Logs.
+    pub logs: &'a [ContactLog],
+    /// Coordinates of each log.
+    pub coordinates: &'a [Coordinates],
+    /// Largest values of the coordinates in the training logs.
+    pub scales: &'a coordinates::Scales,
+    /// Whether these are the training logs: only they may say what belongs to one log.
+    pub training: bool,
+    /// How many training logs there are.
+    pub train_count: usize,
+    /// Whether the baseline has a block in series.
+    pub block: bool,
+}
+
+/// The logs of a drive, and what columns are made from.
+pub struct DriveView<'a> {
+    /// Logs.
+    pub logs: &'a [DriveLog],
+    /// Usual sizes.
+    pub scales: &'a DriveScales,
+    /// The balance that the columns belong to.
+    pub balance: &'a Balance,
+    /// What the base leaves of it: says where a search begins.
+    pub residual: &'a [f64],
+    /// Whether the motion is a turn.
+    pub rotary: bool,
+    /// What the base makes of the inertia.
+    pub inertia: f64,
+}
+
+/// The logs of a press, and what columns are made from.
+pub struct PressView<'a> {
+    /// Logs.
+    pub logs: &'a [PressLog],
+    /// Usual sizes.
+    pub scales: &'a PressScales,
+    /// The balance that the columns belong to.
+    pub balance: &'a Balance,
+    /// What the base leaves of it.
+    pub residual: &'a [f64],
+}
+
+/// All that is known of an effect.
+pub trait Effect: Sync {
+    /// Its id.
+    fn id(&self) -> &'static str;
+
+    /// What it changes in the contact's balance, in one or more forms.
+    fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
+        Vec::new()
+    }
+
+    /// Its columns in the drive's balance, one entry for each shape.
+    fn drive(&self, _view: &DriveView<'_>) -> Vec<Alternative> {
+        Vec::new()
+    }
+
+    /// Its columns in the press's balance, one entry for each shape.
+    fn press(&self, _view: &PressView<'_>) -> Vec<Alternative> {
+        Vec::new()
+    }
+}
+
+macro_rules! library {
+    ($($module:ident :: $effect:ident,)*) => {
+        $(mod $module;)*
+        /// Every effect.
+        pub const LIBRARY: &[&dyn Effect] = &[$(&$module::$effect,)*];
+    };
+}
+
+library! {
+    element_compliance::ElementCompliance,
+    thermal_fade::ThermalFade,
+    wear_drift::WearDrift,
+    disc_angle::DiscAngle,
+    load_dependence::LoadDependence,
+    static_ageing::StaticAgeing,
+    direction_asymmetry::DirectionAsymmetry,
+    bell_curve::BellCurve,
+    rubber_relaxation::RubberRelaxation,
+    viscous_film::ViscousFilm,
+    bridge_crosstalk::BridgeCrosstalk,
+    bridge_drift::BridgeDrift,
+    friction_delay::FrictionDelay,
+    ring_resonance::RingResonance,
+    adc_saturation::AdcSaturation,
+    encoder_eccentricity::EncoderEccentricity,
+    lever_hysteresis::LeverHysteresis,
+    foil_hardening::FoilHardening,
+    m1_ripple::M1Ripple,
+    shaft_torsion::ShaftTorsion,
+    backlash::Backlash,
+    m2_ripple::M2Ripple,
+    bearing_asymmetry::BearingAsymmetry,
+    torque_offset::TorqueOffset,
+    bearing_stribeck::BearingStribeck,
+    presliding::Presliding,
+    drive_delay::DriveDelay,
+}

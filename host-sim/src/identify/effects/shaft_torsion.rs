@@ -1,0 +1,23 @@
+//! `shaft_torsion`: disc and motor are coupled by a torsional spring: a two-mass resonance.
+
+use super::{DriveView, Effect};
+use crate::identify::balance::Alternative;
+use crate::identify::two_mass::{TwoMass, alternatives};
+
+/// The effect.
+pub struct ShaftTorsion;
+
+impl Effect for ShaftTorsion {
+    fn id(&self) -> &'static str {
+        "shaft_torsion"
+    }
+
+    fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
+        let grid = [12.0, 17.0, 24.0, 34.0, 48.0, 68.0].into_iter().flat_map(|mode_hz| {
+            [0.03, 0.15].into_iter().flat_map(move |damping_ratio| {
+                [0.35, 0.65].map(|disc_share| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad: 0.0 })
+            })
+        });
+        alternatives("shaft_torsion", view, grid.collect())
+    }
+}

@@ -1,0 +1,188 @@
+//! Linear filters on an even grid that are the same for every term of a balance, so that both sides of an
+//! equation see the same one and no noise is differentiated on one side only.
+
+/// A Gaussian is cut off after so many standard deviations: what is left out is 6e-5 of its area.
+const REACH: f64 = 4.0;
+
+/// Values filtered with a Gaussian of standard deviation `width` (samples), or with its derivative of order 0 to 3
+/// (per sample). Beyond its ends the signal is mirrored.
+pub fn gaussian(values: &[f64], width: f64, order: usize) -> Vec<f64> {
+    let n = values.len();
+    if n == 0 || width <= 0.0 {
+        return values.to_vec();
+    }
+    let kernel = kernel(width, order);
+    let half = kernel.len() / 2;
+    let mirrored = |i: isize| {
+        let period = 2 * n as isize;
+        let at = i.rem_euclid(period);
+        values[if at < n as isize { at as usize } else { (period - 1 - at) as usize }]
+    };
+    (0..n)
+        .map(|i| {
+            if i >= half && i + half < n {
+                values[i - half..=i + half].iter().zip(&kernel).map(|(x, k)| x * k).sum()
+            } else {
+                kernel
+                    .iter()
+                    .enumerate()
+                    .map(|(j, k)| k * mirrored(i as isize + j as isize - half as isize))
+                    .sum()
+            }
+        })
+        .collect()
+}
+
+/// Weights on the samples before, at and after. A sampled and cut derivative of a Gaussian has wrong moments, and a
+/// position is large against its second difference; so the weights are (b + c x²)·Gaussian, for odd orders times x, with
+/// b and c such that polynomials up to the third degree give their derivatives exactly.
+fn kernel(width: f64, order: usize) -> Vec<f64> {
+    let half = (REACH * width + 0.5) as isize;
+    let places = || (-half..=half).map(|j| j as f64);
+    let weight = |x: f64| (-0.5 * (x / width).powi(2)).exp();
+    let moment = |n: i32| places().map(|x| x.powi(n) * weight(x)).sum::<f64>();
+    let odd = (order % 2) as i32;
+    // Σ (b + c x²) x^(2 odd) w = lower, Σ (b + c x²) x^(2 + 2 odd) w = upper.
+    let (lower, upper) = match order {
+        0 => (1.0, 0.0),
+        1 => (1.0, 0.0),
+        2 => (0.0, 2.0),
+        _ => (0.0, 6.0),
+    };
+    let (b, c) = if order == 0 {
+        (1.0 / moment(0), 0.0)
+    } else {
+        let (m0, m2, m4) = (moment(2 * odd), moment(2 + 2 * odd), moment(4 + 2 * odd));
+        // A first derivative stays a Gaussian's: what smooths the other terms smooths it alike.
+        if order == 1 {
+            (1.0 / m0, 0.0)
+        } else {
+            let d = m0 * m4 - m2 * m2;
+            ((lower * m4 - upper * m2) / d, (upper * m0 - lower * m2) / d)
+        }
+    };
+    places().map(|x| (b + c * x * x) * x.powi(odd) * weight(x)).collect()
+}
+
+/// Largest value within `half` samples on either side.
+pub fn local_maximum(values: &[f64], half: usize) -> Vec<f64> {
+    let n = values.len();
+    let mut waiting: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
+    let mut out = Vec::with_capacity(n);
+    for i in 0..n + half {
+        if i < n {
+            while waiting.back().is_some_and(|&j| values[j] <= values[i]) {
+                waiting.pop_back();
+            }
+            waiting.push_back(i);
+        }
+        if i >= half {
+            while waiting.front().is_some_and(|&j| j + 2 * half < i) {
+                waiting.pop_front();
+            }
+            out.push(waiting.front().map_or(0.0, |&j| values[j]));
+        }
+    }
+    out
+}
+
+/// The signal at t + `ahead` samples (any fraction), by cubics through four samples; held at its ends.
+pub fn shifted(values: &[f64], ahead: f64) -> Vec<f64> {
+    let n = values.len() as isize;
+    if n == 0 || ahead == 0.0 {
+        return values.to_vec();
+    }
+    let whole = ahead.floor();
+    let s = ahead - whole;
+    let whole = whole as isize;
+    // Cubic Hermite with the slopes of the central differences.
+    let w = [
+        -0.5 * s + s * s - 0.5 * s * s * s,
+        1.0 - 2.5 * s * s + 1.5 * s * s * s,
+        0.5 * s + 2.0 * s * s - 1.5 * s * s * s,
+        -0.5 * s * s + 0.5 * s * s * s,
+    ];
+    let at = |i: isize| values[i.clamp(0, n - 1) as usize];
+    (0..n)
+        .map(|i| {
+            let j = i + whole;
+            if j >= 1 && j + 2 < n {
+                let x = &values[(j - 1) as usize..=(j + 2) as usize];
+                w[0] * x[0] + w[1] * x[1] + w[2] * x[2] + w[3] * x[3]
+            } else {
+                w[0] * at(j - 1) + w[1] * at(j) + w[2] * at(j + 1) + w[3] * at(j + 2)
+            }
+        })
+        .collect()
+}
+
+/// Central differences per sample.
+pub fn gradient(values: &[f64]) -> Vec<f64> {
+    let n = values.len();
+    if n < 2 {
+        return vec![0.0; n];
+    }
+    (0..n)
+        .map(|i| match i {
+            0 => values[1] - values[0],
+            i if i == n - 1 => values[i] - values[i - 1],
+            i => 0.5 * (values[i + 1] - values[i - 1]),
+        })
+        .collect()
+}
+
+/// Root of the mean square.
+pub fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Median of the magnitudes; 0 of nothing.
+pub fn median_magnitude(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.map(f64::abs).collect();
+    if sorted.is_empty() {
+        return 0.0;
+    }
+    let middle = sorted.len() / 2;
+    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gaussian_filter_keeps_a_line_and_gives_the_derivatives_of_a_cubic() {
+        let cubic: Vec<f64> = (0..200).map(|i| (0.01 * f64::from(i)).powi(3)).collect();
+        let line: Vec<f64> = (0..200).map(|i| 3.0 - 0.5 * f64::from(i)).collect();
+        let (smooth, slope, second) =
+            (gaussian(&line, 4.0, 0), gaussian(&line, 4.0, 1), gaussian(&cubic, 4.0, 2));
+        let third = gaussian(&cubic, 4.0, 3);
+        for i in 40..160 {
+            assert!((smooth[i] - line[i]).abs() < 1e-10);
+            assert!((slope[i] + 0.5).abs() < 1e-12);
+            assert!((second[i] - 6e-6 * i as f64).abs() < 1e-10);
+            assert!((third[i] - 6e-6).abs() < 1e-12, "{}", third[i]);
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_shifted_exactly() {
+        let parabola = |t: f64| 0.3 * t * t - t;
+        let values: Vec<f64> = (0..50).map(|i| parabola(f64::from(i))).collect();
+        for ahead in [0.37, -2.6, 3.0] {
+            for (i, x) in shifted(&values, ahead).iter().enumerate().take(40).skip(5) {
+                assert!((x - parabola(i as f64 + ahead)).abs() < 1e-9, "{ahead} {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_local_maximum_is_that_of_the_window() {
+        let values: Vec<f64> = (0..60).map(|i| (f64::from(i * i % 17)).sin()).collect();
+        for (i, found) in local_maximum(&values, 3).iter().enumerate() {
+            let expected =
+                values[i.saturating_sub(3)..(i + 4).min(60)].iter().copied().fold(f64::MIN, f64::max);
+            assert!((found - expected).abs() < 1e-15);
+        }
+    }
+}

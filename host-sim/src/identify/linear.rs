@@ -1,0 +1,146 @@
+//! Symmetric positive definite systems, and least squares with bounds from below.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+
+/// The Cholesky factor of a matrix; where rounding has made it indefinite a ridge is added that grows until it is not.
+pub fn factor(matrix: &DMatrix<f64>) -> Cholesky<f64, Dyn> {
+    let scale = matrix.diagonal().amax().max(f64::MIN_POSITIVE);
+    let mut ridge = 0.0;
+    loop {
+        let mut shifted = matrix.clone();
+        for i in 0..shifted.nrows() {
+            shifted[(i, i)] += ridge;
+        }
+        if let Some(factor) = Cholesky::new(shifted) {
+            return factor;
+        }
+        // From rounding (1e-14 of the largest entry) on.
+        ridge = if ridge == 0.0 { 1e-14 * scale } else { 10.0 * ridge };
+        if !ridge.is_finite() {
+            return Cholesky::pack_dirty(DMatrix::identity(matrix.nrows(), matrix.nrows()));
+        }
+    }
+}
+
+/// ln det.
+pub fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * factor.l_dirty().diagonal().iter().map(|x| x.abs().max(f64::MIN_POSITIVE).ln()).sum::<f64>()
+}
+
+/// min ½ xᵀHx − gᵀx with x ≥ `lower`, by an active set that only grows: exact where few bounds bind, and good enough
+/// for a step of a search that is repeated.
+pub fn solve_bounded(h: &DMatrix<f64>, g: &DVector<f64>, lower: &[f64]) -> DVector<f64> {
+    let n = g.len();
+    let mut free: Vec<usize> = (0..n).collect();
+    let mut x = DVector::zeros(n);
+    loop {
+        let held: Vec<usize> = (0..n).filter(|i| !free.contains(i)).collect();
+        for &i in &held {
+            x[i] = lower[i];
+        }
+        if free.is_empty() {
+            return x;
+        }
+        let part = DMatrix::from_fn(free.len(), free.len(), |i, j| h[(free[i], free[j])]);
+        let right = DVector::from_fn(free.len(), |i, _| {
+            g[free[i]] - held.iter().map(|&j| h[(free[i], j)] * x[j]).sum::<f64>()
+        });
+        let solution = factor(&part).solve(&right);
+        let broken: Vec<usize> = (0..free.len()).filter(|&i| solution[i] < lower[free[i]] - 1e-12).collect();
+        for (i, &at) in free.iter().enumerate() {
+            x[at] = solution[i];
+        }
+        if broken.is_empty() {
+            return x;
+        }
+        free = free.iter().enumerate().filter(|(i, _)| !broken.contains(i)).map(|(_, &at)| at).collect();
+    }
+}
+
+/// Least squares with coefficients that are not negative (Lawson and Hanson's active set): min |Ax − b|, given AᵀA and Aᵀb.
+pub fn non_negative(normal: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    let n = right.len();
+    let mut x = DVector::zeros(n);
+    let mut free: Vec<usize> = Vec::new();
+    // Every pass adds one coefficient and may take some back.
+    for _ in 0..4 * n {
+        let gradient = right - normal * &x;
+        let next = (0..n).filter(|i| !free.contains(i)).max_by(|&i, &j| gradient[i].total_cmp(&gradient[j]));
+        let Some(next) = next.filter(|&i| gradient[i] > 1e-12 * right.amax()) else { break };
+        free.push(next);
+        loop {
+            let part = DMatrix::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])]);
+            let solution = factor(&part).solve(&DVector::from_fn(free.len(), |i, _| right[free[i]]));
+            let worst = free
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| solution[*i] <= 0.0)
+                .map(|(i, &at)| x[at] / (x[at] - solution[i]).max(f64::MIN_POSITIVE))
+                .fold(1.0, f64::min);
+            for (i, &at) in free.iter().enumerate() {
+                x[at] += worst * (solution[i] - x[at]);
+            }
+            if worst >= 1.0 {
+                break;
+            }
+            free.retain(|&at| x[at] > 1e-14);
+            for i in 0..n {
+                if !free.contains(&i) {
+                    x[i] = 0.0;
+                }
+            }
+            if free.is_empty() {
+                break;
+            }
+        }
+    }
+    x
+}
+
+/// Sum of products, in eight lanes so that it can be computed in parallel; the order of summation is fixed.
+#[inline]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a8.zip(b8) {
+        for i in 0..8 {
+            lanes[i] += x[i] * y[i];
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// JᵀWJ and JᵀWr.
+pub fn normal_equations(j: &[Vec<f64>], w: &[f64], r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    let n = j.len();
+    let weighted: Vec<Vec<f64>> =
+        j.par_iter().map(|c| c.iter().zip(w).map(|(x, w)| x * w).collect()).collect();
+    let rows: Vec<Vec<f64>> =
+        (0..n).into_par_iter().map(|a| (0..=a).map(|b| dot(&weighted[a], &j[b])).collect()).collect();
+    let h = DMatrix::from_fn(n, n, |a, b| if a >= b { rows[a][b] } else { rows[b][a] });
+    (h, DVector::from_fn(n, |a, _| dot(&weighted[a], r)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_that_binds_holds_and_the_others_move() {
+        let h = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0]);
+        let g = DVector::from_vec(vec![-3.0, 3.0]);
+        let x = solve_bounded(&h, &g, &[0.0, f64::NEG_INFINITY]);
+        assert_eq!(x[0], 0.0);
+        assert!((x[1] - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn non_negative_least_squares_drops_the_negative_coefficient() {
+        let a = DMatrix::from_row_slice(3, 2, &[1.0, 1.0, 1.0, 2.0, 1.0, 3.0]);
+        let b = DVector::from_vec(vec![3.0, 2.0, 1.0]);
+        let x = non_negative(&(a.transpose() * &a), &(a.transpose() * b));
+        assert!((x[0] - 2.0).abs() < 1e-12 && x[1] == 0.0);
+    }
+}

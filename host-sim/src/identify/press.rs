@@ -1,0 +1,164 @@
+//! The press's balance: torque of M1 against normal force, springs and the mechanism's mode.
+//!
+//! T1 = N/G + F0/G + d₁ Ṅ + d₂ N̈ + lateness
+//!
+//! all terms through one Gaussian. The measured normal force is known better than the torque, so the torque is the response.
+//! Rows where the elements are lifted off are left out.
+
+use super::balance::Balance;
+use super::contact::log::ContactLog;
+use super::filters::{gaussian, local_maximum, rms};
+use super::noise;
+use super::term::Parameter;
+use crate::files::rig_file::RigFile;
+
+/// Width of the filter, samples.
+pub const WIDTH: f64 = 4.0;
+/// Rows are taken every so many samples.
+const EVERY: usize = 2;
+/// The elements touch where the normal force is more than this share of its usual size.
+const TOUCHING: f64 = 0.04;
+/// Gain and preload of the rig file are known within 10 %, the mode's coefficients within half.
+const KNOWN: f64 = 0.1;
+
+/// Signals of the press in a log.
+#[derive(Debug, Clone)]
+pub struct PressLog {
+    /// Step, s.
+    pub step_s: f64,
+    /// Torque of M1, N m.
+    pub torque_nm: Vec<f64>,
+    /// Angle of M1, rad.
+    pub angle_rad: Option<Vec<f64>>,
+    /// Normal force, N.
+    pub normal_n: Vec<f64>,
+    /// The same through the filter.
+    pub filtered_n: Vec<f64>,
+    /// Time since the log's start, s.
+    pub time_s: Vec<f64>,
+    /// Points that take part.
+    pub usable: Vec<bool>,
+}
+
+impl PressLog {
+    /// The press of a contact log; `None` where M1's torque is not logged.
+    pub fn new(log: &ContactLog) -> Option<Self> {
+        Some(Self {
+            step_s: log.grid.step_s,
+            torque_nm: log.m1_torque_nm.clone()?,
+            angle_rad: log.m1_angle_rad.clone(),
+            filtered_n: gaussian(&log.normal_n, WIDTH, 0),
+            normal_n: log.normal_n.clone(),
+            time_s: log.grid.time_s.clone(),
+            usable: log.usable.clone(),
+        })
+    }
+
+    /// Points of the grid.
+    pub fn len(&self) -> usize {
+        self.normal_n.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.normal_n.is_empty()
+    }
+
+    /// A signal through the balance's filter.
+    pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
+        gaussian(values, WIDTH, 0)
+    }
+}
+
+/// Usual sizes over the training logs.
+#[derive(Debug, Clone, Copy)]
+pub struct PressScales {
+    /// Normal force, N.
+    pub load_n: f64,
+    /// Torque, N m.
+    pub torque_nm: f64,
+    /// Longest log, s.
+    pub time_s: f64,
+}
+
+impl PressScales {
+    /// Of the training logs.
+    pub fn new(logs: &[PressLog]) -> Self {
+        let usual = |of: &dyn Fn(&PressLog) -> f64| rms(&logs.iter().map(of).collect::<Vec<_>>()).max(1e-12);
+        Self {
+            load_n: usual(&|log| rms(&log.normal_n)),
+            torque_nm: usual(&|log| rms(&log.torque_nm)),
+            time_s: logs.iter().filter_map(|log| log.time_s.last().copied()).fold(1e-9, f64::max),
+        }
+    }
+}
+
+/// The balance of these logs.
+pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balance {
+    let concat = |of: &dyn Fn(&PressLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let derivative = |log: &PressLog, order: usize| -> Vec<f64> {
+        let per = log.step_s.powi(order as i32);
+        gaussian(&log.normal_n, WIDTH, order).iter().map(|d| d / per).collect()
+    };
+    let gain = rig.lever_gain_n_per_nm;
+    let omega = std::f64::consts::TAU * rig.pressure.mode_hz;
+    let known = |name: &str, mean: f64, sd: f64| Parameter {
+        amplitude: false,
+        mean,
+        ..Parameter::amplitude(name, sd)
+    };
+    let base = vec![
+        (known("inverse_gain", 1.0 / gain, KNOWN / gain), concat(&|log| log.filtered_n.clone())),
+        (
+            known(
+                "preload_nm",
+                rig.preload_n / gain,
+                (KNOWN * rig.preload_n / gain).max(0.02 * scales.torque_nm),
+            ),
+            vec![1.0; logs.iter().map(PressLog::len).sum()],
+        ),
+        (
+            known("damping_nm_s_per_n", 2.0 * rig.pressure.damping_ratio / omega / gain, 1.0 / omega / gain),
+            concat(&|log| derivative(log, 1)),
+        ),
+        (
+            known("mass_nm_s2_per_n", 1.0 / (omega * omega * gain), 0.5 / (omega * omega * gain)),
+            concat(&|log| derivative(log, 2)),
+        ),
+        (
+            known("torque_late_s", 0.0, 1e-3),
+            concat(&|log| gaussian(&log.torque_nm, WIDTH, 1).iter().map(|d| -d / log.step_s).collect()),
+        ),
+    ];
+    let (mut deviation, mut used, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+    for log in logs {
+        let from = deviation.len();
+        starts.push(from);
+        let torque_change =
+            local_maximum(&gaussian(&log.torque_nm, WIDTH, 1).iter().map(|d| d.abs()).collect::<Vec<_>>(), 2);
+        let bend =
+            local_maximum(&gaussian(&log.normal_n, WIDTH, 2).iter().map(|d| d.abs()).collect::<Vec<_>>(), 4);
+        let narrow = (0.5 / (std::f64::consts::PI.sqrt() * WIDTH)).sqrt();
+        let white = narrow
+            * noise::standard_deviation(&log.torque_nm)
+                .hypot(noise::standard_deviation(&log.normal_n) / gain);
+        for i in 0..log.len() {
+            let n = [white, 5e-4 * log.torque_nm[i], 0.05 * torque_change[i], 0.6 * bend[i] / gain];
+            deviation.push(n.iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12));
+        }
+        let off: Vec<f64> = (0..log.len())
+            .map(|i| f64::from(u8::from(log.filtered_n[i] < TOUCHING * scales.load_n || !log.usable[i])))
+            .collect();
+        let near = local_maximum(&off, (3.0 * WIDTH) as usize);
+        let border = (4.0 * WIDTH) as usize;
+        used.extend(
+            (border..log.len().saturating_sub(border))
+                .step_by(EVERY)
+                .filter(|i| near[*i] == 0.0)
+                .map(|i| from + i),
+        );
+    }
+    let response = concat(&|log| log.filtered(&log.torque_nm));
+    let row_step_s = EVERY as f64 * logs.iter().map(|log| log.step_s).fold(f64::INFINITY, f64::min);
+    Balance { response, base, deviation, used, temper: 3.0, row_step_s, starts }
+}

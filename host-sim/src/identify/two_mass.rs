@@ -1,0 +1,193 @@
+//! Motor and disc apart: the disc behind a spring with a dead zone, turned by the measured motion of the motor.
+//!
+//! T_s = k (θ_m − θ_d ∓ gap/2) + d (ω_m − ω_d),   J_d ω̇_d = T_s − T_f,   T2 = J_m ω̇_m + bearing + T_s
+//!
+//! θ_m and T_f are measured, so only the disc is integrated; a weak pull towards the torque that the motor's own balance
+//! says is in the shaft keeps it from drifting through the gap, whose crossings are too sensitive to be predicted for long.
+
+use rayon::prelude::*;
+
+use super::balance::Alternative;
+use super::drive::{DriveLog, INERTIA};
+use super::effects::DriveView;
+use super::filters::gaussian;
+use super::term::Parameter;
+
+/// Steps within a sample: a mode of 150 Hz turns by 0.06 rad in one.
+const SUBSTEPS: usize = 16;
+/// Pull towards the observed shaft torque, per sample.
+const PULL: f64 = 0.05;
+/// Rounds in which the best shape's neighbours are tried, the distance halved each time.
+const ROUNDS: usize = 4;
+/// Modes that the balance's filter lets through, Hz.
+const HERTZ: [f64; 2] = [4.0, 150.0];
+
+/// Numbers of a coupling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwoMass {
+    /// Frequency of the disc on the spring, the motor held.
+    pub mode_hz: f64,
+    /// Damping ratio of that mode.
+    pub damping_ratio: f64,
+    /// The disc's share of the inertia.
+    pub disc_share: f64,
+    /// Width of the dead zone.
+    pub gap_rad: f64,
+}
+
+/// Shaft torque for a log.
+fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]) -> Vec<f64> {
+    let n = log.len();
+    let dt = log.grid.step_s;
+    let h = dt / SUBSTEPS as f64;
+    let disc = numbers.disc_share * inertia;
+    let omega = std::f64::consts::TAU * numbers.mode_hz;
+    let (k, d) = (disc * omega * omega, 2.0 * numbers.damping_ratio * disc * omega);
+    let half = 0.5 * numbers.gap_rad;
+    let free = vec![0.0; n];
+    let friction = log.friction.as_ref().unwrap_or(&free);
+    let observed: Vec<f64> = gaussian(&log.effort, 1.0, 0)
+        .iter()
+        .zip(&log.acceleration)
+        .zip(bearing)
+        .map(|((t, a), b)| t - (inertia - disc) * a - b)
+        .collect();
+    // No smaller than what noise makes: inside the gap the torque is nothing.
+    let sure = 0.1 * super::filters::rms(&observed);
+    let x = &log.position;
+    let (mut q, mut w) = (x[0] - observed[0] / k, 0.0);
+    let mut out = vec![0.0; n];
+    for i in 1..n {
+        let (before, now) =
+            ((x[i] - x[i - 1]) / dt, if i + 1 < n { (x[i + 1] - x[i]) / dt } else { (x[i] - x[i - 1]) / dt });
+        let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
+        let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
+        let (mut motor, mut sum) = (x[i - 1], 0.0);
+        for s in 0..SUBSTEPS {
+            let part = (s as f64 + 0.5) / SUBSTEPS as f64;
+            let speed = va + (vb - va) * part;
+            motor += speed * h;
+            let twist = motor - q;
+            let torque = if twist > half {
+                (k * (twist - half) + d * (speed - w)).max(if half > 0.0 { 0.0 } else { f64::NEG_INFINITY })
+            } else if twist < -half {
+                (k * (twist + half) + d * (speed - w)).min(if half > 0.0 { 0.0 } else { f64::INFINITY })
+            } else if half > 0.0 {
+                0.0
+            } else {
+                k * twist + d * (speed - w)
+            };
+            w += h * (torque - (friction[i - 1] + (friction[i] - friction[i - 1]) * part)) / disc;
+            q += h * w;
+            sum += torque;
+        }
+        out[i] = sum / SUBSTEPS as f64;
+        if observed[i].abs() > sure || half == 0.0 {
+            let target = x[i] - observed[i] / k - observed[i].signum() * half;
+            let off = target - q;
+            q += PULL * off;
+            w += 0.06 * PULL * off / dt;
+        }
+        if !q.is_finite() || !w.is_finite() || q.abs() > 1e9 {
+            return vec![f64::NAN; n];
+        }
+    }
+    out
+}
+
+fn alternative(
+    effect: &'static str,
+    view: &DriveView<'_>,
+    numbers: &TwoMass,
+    bearing: &[f64],
+    share: f64,
+) -> Option<Alternative> {
+    let n = numbers;
+    let allowed = (HERTZ[0]..HERTZ[1]).contains(&n.mode_hz)
+        && (0.003..1.5).contains(&n.damping_ratio)
+        && (0.1..0.9).contains(&n.disc_share);
+    if !allowed {
+        return None;
+    }
+    let mut added = Vec::with_capacity(view.balance.response.len());
+    let mut from = 0;
+    for log in view.logs {
+        let torque = shaft_torque(log, numbers, view.inertia, &bearing[from..from + log.len()]);
+        from += log.len();
+        let most = 10.0 * view.scales.effort;
+        let friction = log.friction.as_ref();
+        let change: Vec<f64> = torque
+            .iter()
+            .enumerate()
+            .map(|(i, t)| friction.map_or(0.0, |f| f[i]) - t.clamp(-most, most))
+            .collect();
+        if change.iter().any(|x| !x.is_finite()) {
+            return None;
+        }
+        added.extend(log.filtered(&change));
+    }
+    let disc = numbers.disc_share * view.inertia;
+    let omega = std::f64::consts::TAU * numbers.mode_hz;
+    let mut constants = vec![
+        ("stiffness_nm_per_rad".to_string(), disc * omega * omega),
+        ("damping_nm_s_per_rad".to_string(), 2.0 * numbers.damping_ratio * disc * omega),
+        ("disc_inertia_kg_m2".to_string(), disc),
+        ("mode_hz".to_string(), numbers.mode_hz),
+    ];
+    if numbers.gap_rad > 0.0 {
+        constants.push(("gap_rad".to_string(), numbers.gap_rad));
+    }
+    Some(Alternative {
+        form: format!("{:.0} Hz, gap {:.2e} rad", numbers.mode_hz, numbers.gap_rad),
+        response: Some(added),
+        base_shift: vec![(INERTIA, -disc)],
+        constants,
+        log_prior: -share.ln(),
+        ..Alternative::columns(effect, Vec::<Parameter>::new(), Vec::new())
+    })
+}
+
+/// The best shapes of a coupling: a coarse grid, then neighbours of the best one.
+pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMass>) -> Vec<Alternative> {
+    if !view.rotary || view.inertia <= 0.0 {
+        return Vec::new();
+    }
+    // What the base alone makes of the bearing.
+    let bearing = view.balance.bearing(view.residual);
+    let share = grid.len() as f64 * 3f64.powi(ROUNDS as i32);
+    let mut best: Option<(f64, TwoMass, Alternative)> = None;
+    let mut wave = grid;
+    let mut ratio = 1.4;
+    for _ in 0..=ROUNDS {
+        let tried: Vec<(f64, TwoMass, Alternative)> = wave
+            .par_iter()
+            .filter_map(|numbers| {
+                let one = alternative(effect, view, numbers, &bearing, share)?;
+                let evidence = view.balance.solve(std::slice::from_ref(&one), &[0]).log_evidence;
+                Some((evidence, *numbers, one))
+            })
+            .collect();
+        for found in tried {
+            if best.as_ref().is_none_or(|b| found.0 > b.0) {
+                best = Some(found);
+            }
+        }
+        let Some((_, n, _)) = best else { return Vec::new() };
+        wave = [ratio, 1.0 / ratio]
+            .into_iter()
+            .flat_map(|f| {
+                let mut near = vec![
+                    TwoMass { mode_hz: n.mode_hz * f, ..n },
+                    TwoMass { damping_ratio: n.damping_ratio * f * f, ..n },
+                    TwoMass { disc_share: (n.disc_share * f.sqrt()).clamp(0.1, 0.89), ..n },
+                ];
+                if n.gap_rad > 0.0 {
+                    near.push(TwoMass { gap_rad: n.gap_rad * f, ..n });
+                }
+                near
+            })
+            .collect();
+        ratio = ratio.sqrt();
+    }
+    best.map(|(_, _, one)| one).into_iter().collect()
+}
