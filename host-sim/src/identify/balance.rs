@@ -62,8 +62,10 @@ pub struct Balance {
     pub response: Vec<f64>,
     /// Base parameters and columns.
     pub base: Vec<(Parameter, Vec<f64>)>,
-    /// Deviation of each row.
+    /// Deviation of each row, as refitted.
     pub deviation: Vec<f64>,
+    /// Deviation of each row before it was refitted: from named sources alone.
+    pub first_deviation: Vec<f64>,
     /// Rows that take part.
     pub used: Vec<usize>,
     /// Rows that count as one.

@@ -1,80 +1,374 @@
-//! Everything put together: contact, drive and press searched, then one table over what they found.
+//! The diagnosis: contact, drive and press searched, one table over what they found, and what is left.
+//!
+//! A hypothesis is a set of effects. Each effect enters every balance that it touches; the evidence of a set is the sum
+//! over the balances, each with the best of its sets that has no other effect. So a sensor's fault that the contact could
+//! take for friction is decided by the drive, without a rule.
 
+use super::balance::{self, Alternative, Balance, Solved};
+use super::contact::change::ContactTerm;
+use super::contact::log::ContactLog;
+use super::contact::noise::MODEL_FORM;
+use super::contact::problem::{Baseline, Fit, Noise, Problem};
+use super::contact::search;
+use super::contact::baseline as contact_baseline;
+use super::drive::{self, DriveLog, DrivePrior, DriveScales};
+use super::effects::coordinates::{Coordinates, Scales};
+use super::effects::{ContactView, DriveView, LIBRARY, PressView};
+use super::press::{self, PressLog, PressScales};
+use super::rest::{self, Rest};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 
-use super::balance::{self, Alternative, Balance, Solved};
-use super::contact::baseline;
-use super::contact::change::ContactTerm;
-use super::contact::log::ContactLog;
-use super::contact::problem::{Baseline, Problem};
-use super::contact::search::{self, Found};
-use super::drive::{self, DriveLog, DrivePrior, DriveScales};
-use super::effects::coordinates::{Coordinates, Scales};
-use super::effects::{ContactView, DriveView, LIBRARY, PressView};
-use super::press::{self, PressLog, PressScales};
-
 /// Sets of effects in the drive's and in the press's balance have at most so many.
 const MOST_AT_ONCE: usize = 2;
+/// ln of the prior probability that an effect of the library acts: one in fifty.
+const LOG_PRIOR: f64 = -3.9;
+/// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
+const EVIDENCE_SHARE: f64 = 0.1;
+/// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
+const SIZE_WIDTH: f64 = 0.25 / 1.7;
+/// Sets of each balance that enter the table.
+const CANDIDATES: usize = 12;
+
+/// Which balance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// Friction torque.
+    Friction,
+    /// Torque of M2, or the force of a stage.
+    Drive,
+    /// Torque of M1.
+    Pressure,
+}
+
+impl Part {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Friction => "friction",
+            Self::Drive => "drive",
+            Self::Pressure => "pressure",
+        }
+    }
+}
+
+/// A set of effects in one balance.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Effects, in alphabetical order.
+    pub effects: Vec<&'static str>,
+    /// ln evidence.
+    pub log_evidence: f64,
+    /// Place in the balance's own list.
+    pub place: usize,
+    /// Change of the prediction by each effect, relative to the signal, in the order of `effects`.
+    pub sizes: Vec<f64>,
+}
 
 /// A searched linear balance.
-pub struct Searched {
+pub struct Linear {
     /// The balance, with its noise as refitted.
     pub balance: Balance,
     /// Forms of the effects.
     pub alternatives: Vec<Alternative>,
     /// Sets, best first.
     pub solved: Vec<Solved>,
+    /// RMS of the response over its rows.
+    pub signal: f64,
 }
 
 /// The contact, searched.
-pub struct SearchedContact {
-    /// Logs.
+pub struct ContactPart {
+    /// Training logs.
     pub logs: Vec<ContactLog>,
+    /// Scales of the columns.
+    pub scales: Scales,
     /// Baseline.
     pub baseline: Baseline,
+    /// Whether the baseline has a block.
+    pub block: bool,
     /// Forms of the effects.
     pub terms: Vec<ContactTerm>,
+    /// Noise as refitted.
+    pub noise: Noise,
     /// Sets, best first.
-    pub found: Found,
+    pub ranked: Vec<search::Ranked>,
 }
 
-fn view_terms(
-    logs: &[ContactLog],
-    scales: &Scales,
-    training: bool,
-    train_count: usize,
-    block: bool,
-) -> Vec<ContactTerm> {
+impl ContactPart {
+    /// The likelihood of the training logs.
+    pub fn problem(&self) -> Problem<'_> {
+        Problem::with_noise(&self.logs, &self.baseline, &self.terms, self.noise.clone())
+    }
+
+    /// The fit of a candidate.
+    pub fn fit(&self, place: usize) -> &Fit {
+        &self.ranked[place].fit
+    }
+}
+
+/// Terms of all effects for these logs.
+pub fn contact_terms(logs: &[ContactLog], scales: &Scales, training: bool, train_count: usize, block: bool) -> Vec<ContactTerm> {
     let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
     let view = ContactView { logs, coordinates: &coordinates, scales, training, train_count, block };
     LIBRARY.iter().flat_map(|effect| effect.contact(&view)).collect()
 }
 
 /// The drive's balance of these logs, searched.
-pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Searched {
+pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Linear {
     let scales = DriveScales::new(logs);
     let mut balance = drive::balance(logs, prior, &scales);
     let base = balance.solve(&[], &[]);
     let inertia = base.p[drive::INERTIA];
-    let view =
-        DriveView { logs, scales: &scales, balance: &balance, residual: &base.residual, rotary, inertia };
+    let view = DriveView { logs, scales: &scales, balance: &balance, residual: &base.residual, rotary, inertia, fixed: None };
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.drive(&view)).collect();
     let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
-    Searched { balance, alternatives, solved }
+    let signal = balance.rms(&balance.response);
+    Linear { balance, alternatives, solved, signal }
 }
 
 /// The press's balance of these logs, searched.
-pub fn search_press(logs: &[PressLog], rig: &RigFile) -> Searched {
+pub fn search_press(logs: &[PressLog], rig: &RigFile) -> Linear {
     let scales = PressScales::new(logs);
     let mut balance = press::balance(logs, rig, &scales);
     let base = balance.solve(&[], &[]);
-    let view = PressView { logs, scales: &scales, balance: &balance, residual: &base.residual };
+    let view = PressView { logs, scales: &scales, balance: &balance, residual: &base.residual, fixed: None };
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.press(&view)).collect();
     let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
-    Searched { balance, alternatives, solved }
+    let signal = balance.rms(&balance.response);
+    Linear { balance, alternatives, solved, signal }
+}
+
+impl Linear {
+    fn candidates(&self) -> Vec<Candidate> {
+        let names = |set: &[usize]| sorted(set.iter().map(|a| self.alternatives[*a].effect).collect());
+        let mut out = Vec::new();
+        for (place, solved) in self.solved.iter().enumerate() {
+            let wanted = place < CANDIDATES || solved.set.len() < 2;
+            if !wanted {
+                continue;
+            }
+            let mut effects: Vec<(&'static str, f64)> = solved
+                .set
+                .iter()
+                .map(|a| {
+                    let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
+                    let without = self.balance.solve(&self.alternatives, &set);
+                    let size = self.balance.difference(&solved.residual, &without.residual) / self.signal.max(1e-12);
+                    (self.alternatives[*a].effect, size)
+                })
+                .collect();
+            effects.sort_by_key(|e| e.0);
+            debug_assert_eq!(names(&solved.set), effects.iter().map(|e| e.0).collect::<Vec<_>>());
+            out.push(Candidate {
+                effects: effects.iter().map(|e| e.0).collect(),
+                log_evidence: solved.log_evidence,
+                place,
+                sizes: effects.iter().map(|e| e.1).collect(),
+            });
+        }
+        out
+    }
+
+    /// What a set leaves.
+    pub fn rest(&self, place: usize) -> Rest {
+        let none = self.solved.iter().find(|s| s.set.is_empty());
+        rest::of_balance(&self.balance, &self.solved[place].residual, none.map(|s| s.residual.as_slice()))
+    }
+}
+
+fn sorted(mut names: Vec<&'static str>) -> Vec<&'static str> {
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+/// A hypothesis in the table.
+#[derive(Debug, Clone)]
+pub struct Hypothesis {
+    /// Effects, in alphabetical order.
+    pub effects: Vec<&'static str>,
+    /// ln evidence over all balances, with the prior.
+    pub log_weight: f64,
+    /// Place of the candidate in each part.
+    pub places: Vec<(Part, usize)>,
+    /// Largest change of a prediction by each effect, relative to the signal.
+    pub sizes: Vec<f64>,
+    /// Posterior probability.
+    pub probability: f64,
+}
+
+/// What was found.
+pub struct Judgement {
+    /// The contact, where the logs have one.
+    pub contact: Option<ContactPart>,
+    /// The drive, where its torque is logged.
+    pub drive: Option<Linear>,
+    /// The press, where its torque is logged.
+    pub press: Option<Linear>,
+    /// All hypotheses compared, the answer first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Effects that a balance asked for but that change less than the model's form is known to, with their sizes.
+    pub too_small: Vec<(&'static str, f64)>,
+    /// Probability that the rest is something that the library does not have.
+    pub unknown: f64,
+    /// What is left, by balance.
+    pub rests: Vec<(Part, Rest)>,
+    /// What was assumed about the input.
+    pub notes: Vec<String>,
+    /// Whether the logs are of a linear stage.
+    pub linear_stage: bool,
+}
+
+/// Probability that an effect of this size is real and not the form of the model.
+pub fn real(size: f64) -> f64 {
+    1.0 / (1.0 + (-(size.max(1e-9) / MODEL_FORM).ln() / SIZE_WIDTH).exp())
+}
+
+/// Diagnoses training logs.
+///
+/// # Errors
+/// Where logs are of different kinds, or have nothing that can be analysed.
+pub fn judge(train: &[Log], rig: &RigFile, model: &ModelFile, told: &(dyn Fn(&str) + Sync)) -> Result<Judgement, InputError> {
+    let kinds = train.iter().map(Log::kind).collect::<Result<Vec<_>, _>>()?;
+    if kinds.windows(2).any(|k| k[0] != k[1]) {
+        return Err(InputError::new("logs of different kinds together").key("--train").allowed("contact logs, or drive logs"));
+    }
+    let mut notes = Vec::new();
+    let (mut contact, mut drive, mut press) = (None, None, None);
+    let linear_stage = kinds.first() == Some(&LogKind::LinearDrive);
+    if kinds.first() == Some(&LogKind::Contact) {
+        let logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+        let drives: Vec<DriveLog> =
+            logs.iter().filter_map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
+        if drives.len() == logs.len() {
+            told("drive");
+            drive = Some(search_drive(&drives, &drive_prior(rig), true));
+        } else {
+            notes.push("no torque of M2: the drive is not looked at".to_string());
+        }
+        let presses: Vec<PressLog> = logs.iter().filter_map(PressLog::new).collect();
+        if presses.len() == logs.len() {
+            told("press");
+            press = Some(search_press(&presses, rig));
+        } else {
+            notes.push("no torque of M1: the press is not looked at".to_string());
+        }
+        let scales = Scales::new(&logs);
+        let block = contact_baseline::has_block(model);
+        let terms = contact_terms(&logs, &scales, true, logs.len(), block);
+        let baseline = contact_baseline::baseline(model, contact_baseline::KNOWN_WITHIN);
+        let (noise, ranked) = {
+            let mut problem = Problem::new(&logs, &baseline, &terms);
+            let found = search::search(&mut problem, told);
+            (problem.noise.clone(), found.ranked)
+        };
+        contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked });
+    } else {
+        let logs = train.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
+        told("drive");
+        drive = Some(search_drive(&logs, &DrivePrior { inertia: None, coulomb: None, viscous: None }, !linear_stage));
+    }
+    told("table of causes");
+    let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
+    if let Some(contact) = &contact {
+        parts.push((Part::Friction, contact_candidates(contact)));
+    }
+    if let Some(drive) = &drive {
+        parts.push((Part::Drive, drive.candidates()));
+    }
+    if let Some(press) = &press {
+        parts.push((Part::Pressure, press.candidates()));
+    }
+    let (hypotheses, too_small) = table(&parts);
+    let mut judgement =
+        Judgement { contact, drive, press, hypotheses, too_small, unknown: 0.0, rests: Vec::new(), notes, linear_stage };
+    judgement.rests = judgement.rests();
+    judgement.unknown = judgement.rests.iter().map(|(_, rest)| rest.unknown()).fold(0.0, f64::max);
+    Ok(judgement)
+}
+
+fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
+    let problem = contact.problem();
+    let mut out = Vec::new();
+    for (place, ranked) in contact.ranked.iter().enumerate() {
+        let fit = &ranked.fit;
+        let sizes = search::sizes(&problem, fit);
+        let mut effects: Vec<(&'static str, f64)> =
+            fit.terms.iter().map(|t| contact.terms[*t].effect).zip(sizes).collect();
+        effects.sort_by_key(|e| e.0);
+        out.push(Candidate {
+            effects: effects.iter().map(|e| e.0).collect(),
+            log_evidence: ranked.log_evidence,
+            place,
+            sizes: effects.iter().map(|e| e.1).collect(),
+        });
+    }
+    out
+}
+
+/// The best candidate that has no effect but these; of each effect its size there.
+fn within<'c>(candidates: &'c [Candidate], effects: &[&str]) -> Option<&'c Candidate> {
+    candidates
+        .iter()
+        .filter(|c| c.effects.iter().all(|e| effects.contains(e)))
+        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+}
+
+fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static str, f64)>) {
+    // Sets: one candidate of each part, put together.
+    let mut sets: Vec<Vec<&'static str>> = vec![Vec::new()];
+    for (_, candidates) in parts {
+        let mut next = Vec::new();
+        for set in &sets {
+            for candidate in candidates {
+                let joined = sorted(set.iter().chain(&candidate.effects).copied().collect());
+                if !next.contains(&joined) {
+                    next.push(joined);
+                }
+            }
+        }
+        sets = next;
+    }
+    let mut all: Vec<Hypothesis> = sets
+        .into_iter()
+        .filter_map(|effects| {
+            let mut log_weight = LOG_PRIOR * effects.len() as f64;
+            let mut sizes = vec![0.0f64; effects.len()];
+            let mut places = Vec::new();
+            for (part, candidates) in parts {
+                let best = within(candidates, &effects)?;
+                log_weight += EVIDENCE_SHARE * best.log_evidence;
+                places.push((*part, best.place));
+                for (effect, size) in best.effects.iter().zip(&best.sizes) {
+                    let at = effects.iter().position(|e| e == effect)?;
+                    sizes[at] = sizes[at].max(*size);
+                }
+            }
+            Some(Hypothesis { effects, log_weight, places, sizes, probability: 0.0 })
+        })
+        .collect();
+    all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    // An effect below the model's form is taken out of the table, the smallest first.
+    let mut too_small: Vec<(&'static str, f64)> = Vec::new();
+    while let Some((effect, size)) = all.first().and_then(|best| {
+        let pairs = best.effects.iter().copied().zip(best.sizes.iter().copied());
+        pairs.filter(|(_, size)| *size < MODEL_FORM).min_by(|a, b| a.1.total_cmp(&b.1))
+    }) {
+        too_small.push((effect, size));
+        all.retain(|h| !h.effects.contains(&effect));
+    }
+    // Two sets with the same effects in use are one.
+    let top = all.first().map_or(0.0, |h| h.log_weight);
+    let mut mass = 0.0;
+    for h in &mut all {
+        h.probability = (h.log_weight - top).exp() * h.sizes.iter().map(|s| real(*s)).product::<f64>();
+        mass += h.probability;
+    }
+    all.iter_mut().for_each(|h| h.probability /= mass.max(1e-300));
+    (all, too_small)
 }
 
 /// What the drive is known to be by the rig file.
@@ -83,5 +377,41 @@ pub fn drive_prior(rig: &RigFile) -> DrivePrior {
         inertia: Some(rig.m2_inertia_kg_m2),
         coulomb: Some(rig.bearing_coulomb_nm),
         viscous: Some(rig.bearing_viscous_nm_s_per_rad),
+    }
+}
+
+impl Judgement {
+    /// The answer.
+    pub fn best(&self) -> &Hypothesis {
+        &self.hypotheses[0]
+    }
+
+    /// A part's place in the answer.
+    pub fn place(&self, part: Part) -> Option<usize> {
+        self.best().places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place)
+    }
+
+    fn rests(&self) -> Vec<(Part, Rest)> {
+        let mut out = Vec::new();
+        if let (Some(contact), Some(place)) = (&self.contact, self.place(Part::Friction)) {
+            out.push((Part::Friction, rest::of_contact(contact, place)));
+        }
+        for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.press)] {
+            if let (Some(linear), Some(place)) = (linear, self.place(part)) {
+                out.push((part, linear.rest(place)));
+            }
+        }
+        out
+    }
+
+    /// `none`, `named` or `unknown`.
+    pub fn verdict(&self) -> &'static str {
+        if self.unknown > 0.5 {
+            "unknown"
+        } else if self.best().effects.is_empty() {
+            "none"
+        } else {
+            "named"
+        }
     }
 }

@@ -10,5 +10,6 @@ pub mod judge;
 pub mod linear;
 pub mod noise;
 pub mod press;
+pub mod rest;
 pub mod term;
 pub mod two_mass;

@@ -152,6 +152,14 @@ pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMas
     if !view.rotary || view.inertia <= 0.0 {
         return Vec::new();
     }
+    if let Some(fixed) = view.fixed {
+        let get = |name: &str| fixed.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
+        let (disc, k, mode_hz) = (get("disc_inertia_kg_m2"), get("stiffness_nm_per_rad"), get("mode_hz"));
+        let damping_ratio = get("damping_nm_s_per_rad") * std::f64::consts::PI * mode_hz / k.max(1e-12);
+        let numbers = TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
+        let bearing = view.balance.bearing(view.residual);
+        return alternative(effect, view, &numbers, &bearing, 1.0).into_iter().collect();
+    }
     // What the base alone makes of the bearing.
     let bearing = view.balance.bearing(view.residual);
     let share = grid.len() as f64 * 3f64.powi(ROUNDS as i32);

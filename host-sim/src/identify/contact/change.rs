@@ -1,6 +1,7 @@
 //! What a hypothesis changes in the contact's balance, whatever effect asked for it.
 
 use super::law::Ageing;
+use super::problem::Numbers;
 use crate::identify::term::{Column, Parameter, Starts};
 
 /// Changes to the contact and its sensor; several effects add up.
@@ -14,8 +15,8 @@ pub struct Change {
     pub log_curve: Option<Vec<f64>>,
     /// Force per slip speed whatever the load, N s/m.
     pub film_n_s_per_m: f64,
-    /// Stiffness of the Maxwell branches, N/m.
-    pub branches_n_per_m: [f64; 3],
+    /// Maxwell branches beside the series spring: stiffness, N/m, and relaxation time, s.
+    pub branches: [(f64, f64); 3],
     /// Ageing of the contact.
     pub ageing: Option<Ageing>,
     /// How much later than the rig file says the friction channel is, s.
@@ -68,7 +69,12 @@ pub struct ContactTerm {
     pub law: bool,
     /// What it changes.
     pub act: Box<dyn Fn(&[f64], &mut Change) + Send + Sync>,
+    /// The core's parameters for fitted values; may change the baseline's numbers. `None` where the form is no law.
+    pub export: Option<Export>,
 }
+
+/// From fitted values to the core's parameters, names with units.
+pub type Export = Box<dyn Fn(&[f64], &mut Numbers) -> Vec<(String, f64)> + Send + Sync>;
 
 impl ContactTerm {
     /// Friction multiplied with e^(Σ size × column).
@@ -78,7 +84,7 @@ impl ContactTerm {
         columns: Vec<Column>,
         parameters: Vec<Parameter>,
     ) -> Self {
-        let zero = parameters.iter().map(|p| if p.lower == 0.0 { 0.02 } else { 0.0 }).collect();
+        let zero = vec![0.0; parameters.len()];
         let shared = columns.clone();
         Self {
             effect,
@@ -87,6 +93,7 @@ impl ContactTerm {
             starts: Starts::At(vec![zero]),
             columns: Some(columns),
             law: false,
+            export: None,
             act: Box::new(move |sizes, change| change.add_log_factor(&shared, sizes)),
         }
     }
@@ -106,8 +113,27 @@ impl ContactTerm {
             starts: Starts::At(vec![zero]),
             columns: None,
             law: false,
+            export: None,
             act: Box::new(move |sizes, change| change.add_shown(&columns, sizes)),
         }
+    }
+
+    /// With the core's parameters for it.
+    #[must_use]
+    pub fn exported(
+        mut self,
+        export: impl Fn(&[f64], &mut Numbers) -> Vec<(String, f64)> + Send + Sync + 'static,
+    ) -> Self {
+        self.export = Some(Box::new(export));
+        self
+    }
+
+    /// As a law that is fitted once another form of its effect leads.
+    #[must_use]
+    pub fn as_law(mut self) -> Self {
+        self.law = true;
+        self.form = "law";
+        self
     }
 
     /// Any change.
@@ -117,6 +143,15 @@ impl ContactTerm {
         starts: Starts,
         act: impl Fn(&[f64], &mut Change) + Send + Sync + 'static,
     ) -> Self {
-        Self { effect, form: "", parameters, starts, columns: None, law: false, act: Box::new(act) }
+        Self {
+            effect,
+            form: "",
+            parameters,
+            starts,
+            columns: None,
+            law: false,
+            act: Box::new(act),
+            export: None,
+        }
     }
 }

@@ -7,8 +7,6 @@ const SLOWEST_M_S: f64 = 1e-6;
 const FASTEST_M_S: f64 = 20.0;
 /// Entries; a step is 4 % of speed, and a straight line over it errs by 4e-5 of a coefficient.
 const ENTRIES: usize = 420;
-/// Maxwell branches of the rubber beside its spring: relaxation times over three decades, s.
-pub const BRANCH_TIMES_S: [f64; 3] = [0.02, 0.2, 2.0];
 
 /// A friction curve g(w) ≥ 0 over the slip speed w ≥ 0.
 #[derive(Debug, Clone)]
@@ -94,8 +92,8 @@ pub struct Contact {
     pub stiffness_n_per_m: f64,
     /// Its damping, N s/m.
     pub damping_n_s_per_m: f64,
-    /// Stiffness of the Maxwell branches beside it, N/m.
-    pub branches_n_per_m: [f64; 3],
+    /// Maxwell branches beside it: stiffness, N/m, and relaxation time, s.
+    pub branches: [(f64, f64); 3],
     /// Friction per slip speed: per load, s/m, and whatever the load, N s/m.
     pub viscous: (f64, f64),
     /// Ageing, where it acts.

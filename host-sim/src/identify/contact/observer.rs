@@ -13,7 +13,7 @@
 //! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
 //! Left out: what the force did between samples; slip that begins and ends within one.
 
-use super::law::{BRANCH_TIMES_S, Contact, Curve};
+use super::law::{Contact, Curve};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Width of the sigmoids, relative to their threshold.
@@ -82,7 +82,7 @@ impl Block {
         let k = contact.stiffness_n_per_m;
         // A spring without damping follows the force at once; a time constant of 1e-3 of a step says the same.
         let c = contact.damping_n_s_per_m.max(1e-3 * step_s * k);
-        let kb = contact.branches_n_per_m;
+        let kb = contact.branches.map(|b| b.0);
         let branched = kb.iter().any(|k| *k > 0.0);
         if !branched {
             let tau = c / k;
@@ -102,8 +102,8 @@ impl Block {
             }
             a[(row, 4)] = 1.0 / c;
         }
-        for (b, time_s) in BRANCH_TIMES_S.iter().enumerate() {
-            a[(1 + b, 1 + b)] -= 1.0 / time_s;
+        for (b, (_, time_s)) in contact.branches.iter().enumerate() {
+            a[(1 + b, 1 + b)] -= 1.0 / time_s.max(1e-6);
         }
         a[(4, 5)] = 1.0 / step_s;
         let e = (a * step_s).exp();
@@ -164,7 +164,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let least_load = LEAST_LOAD * drive.load_n.iter().copied().fold(0.0, f64::max);
     let threshold = drive.slip_threshold_m_s;
     let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
-    let branch: [f64; 3] = std::array::from_fn(|b| 1.0 / (1.0 + dt / BRANCH_TIMES_S[b]));
+    let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
     let mut observed = start;
     let mut held = start;
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
@@ -203,7 +203,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let moved = v * dt;
             let mut sticking = k * (held[0] + moved) + c * v;
             for b in 0..3 {
-                sticking += contact.branches_n_per_m[b] * (held[1 + b] + moved) * branch[b];
+                sticking += contact.branches[b].0 * (held[1 + b] + moved) * branch[b];
             }
             // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
             let limit = loaded * rest;

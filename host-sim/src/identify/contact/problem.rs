@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::change::{Change, ContactTerm};
 use super::law::{Contact, Curve};
 use super::log::ContactLog;
-use super::noise::Noise;
+pub use super::noise::Noise;
 use super::observer::{Drive, Observed, observe};
 use crate::identify::filters::{gaussian, rms, shifted};
 use crate::identify::linear::{self, normal_equations};
@@ -168,6 +168,11 @@ impl<'a> Problem<'a> {
         problem
     }
 
+    /// With a noise model that was fitted before.
+    pub fn with_noise(logs: &'a [ContactLog], baseline: &'a Baseline, terms: &'a [ContactTerm], noise: Noise) -> Self {
+        Self { logs, baseline, terms, noise }
+    }
+
     /// Measured values, all logs on end.
     pub fn measured(&self) -> impl Iterator<Item = f64> + '_ {
         self.logs.iter().flat_map(|log| log.friction_nm.iter().copied())
@@ -184,7 +189,7 @@ impl<'a> Problem<'a> {
             curve,
             stiffness_n_per_m: k,
             damping_n_s_per_m: c,
-            branches_n_per_m: change.branches_n_per_m,
+            branches: change.branches,
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,
         }
@@ -378,7 +383,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
-    /// are taken once at the start: what is minimised is evaluated anew in each iteration all the same.
+    /// are taken anew every other iteration: what is minimised is evaluated in each.
     pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, slopes: Option<&Slopes>) -> Fit {
         let parameters: Vec<&Parameter> = self.parameters(terms).collect();
         let n = parameters.len();
@@ -386,9 +391,12 @@ impl<'a> Problem<'a> {
         let mut r = self.residuals(terms, &p);
         let mut cost = self.cost(terms, &p, &r);
         let mut damping = 1e-3;
-        let own = slopes.is_none().then(|| self.slopes(terms, &p, &r));
-        let Some(slopes) = slopes.or(own.as_ref()) else { return Fit { terms: terms.to_vec(), p, r, cost } };
-        for _ in 0..iterations {
+        let mut own = None;
+        for iteration in 0..iterations {
+            if slopes.is_none() && iteration % 2 == 0 {
+                own = Some(self.slopes(terms, &p, &r));
+            }
+            let Some(slopes) = slopes.or(own.as_ref()) else { break };
             let j = self.jacobian_with(slopes, terms, &p, &r);
             let w = self.weights(&r);
             let (mut h, mut g) = normal_equations(&j, &w, &r);
@@ -398,7 +406,7 @@ impl<'a> Problem<'a> {
                 g[i] -= (p[i] - q.mean) / (sd * sd);
             }
             let mut found = None;
-            for _ in 0..4 {
+            for _ in 0..6 {
                 let mut damped = h.clone();
                 for i in 0..n {
                     damped[(i, i)] *= 1.0 + damping;

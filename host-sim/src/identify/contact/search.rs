@@ -48,7 +48,7 @@ pub fn sizes(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
             p.drain(from..from + counts[out]);
             let mut terms = fit.terms.clone();
             terms.remove(out);
-            let without = problem.fit(&terms, p, 4, None);
+            let without = problem.fit(&terms, p, 8, None);
             difference(problem, &fit.r, &without.r)
         })
         .collect()
@@ -79,7 +79,7 @@ pub struct Found {
 pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found {
     let base = baseline(problem);
     told("single causes");
-    let singles = singles(problem, &base);
+    let (singles, known) = singles(problem, &base);
     let mut all: Vec<Fit> = singles.iter().take(FINALISTS).cloned().collect();
     all.push(base.clone());
     let mut parents: Vec<Fit> = singles.into_iter().take(PARENTS).collect();
@@ -90,7 +90,7 @@ pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found 
             break;
         }
         told(what);
-        let children = children(problem, &parents);
+        let children = children(problem, &parents, &known);
         parents = children.iter().take(2).cloned().collect();
         all.extend(children.into_iter().take(FINALISTS));
     }
@@ -106,7 +106,7 @@ pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found 
             }
         }
         let again: Vec<Fit> =
-            kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 4, None)).collect();
+            kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 6, None)).collect();
         ranked = rank(problem, again);
     }
     Found { ranked }
@@ -136,30 +136,80 @@ fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
 fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]) -> Vec<Fit> {
     for &(keep, iterations) in rounds {
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        if std::env::var("STAGES").is_ok() { eprintln!("stage {keep} {iterations}: {:?}", fits.iter().map(|f| format!("{} {:.0}", f.terms.iter().map(|t| format!("{}/{}", problem.terms[*t].effect, problem.terms[*t].form)).collect::<Vec<_>>().join("+"), f.cost)).collect::<Vec<_>>()); }
         fits.truncate(keep);
         fits = fits.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, iterations, None)).collect();
     }
     unique(fits)
 }
 
-fn singles(problem: &Problem<'_>, base: &Fit) -> Vec<Fit> {
+/// The best single terms, and for each nonlinear one the points where it stood after a few iterations.
+fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Vec<Vec<f64>>>>) {
     let slopes = problem.slopes(&[], &base.p, &base.r);
-    let starts: Vec<(usize, Vec<f64>)> = (0..problem.terms.len())
-        .flat_map(|term| problem.starts(base, term).into_iter().map(move |start| (term, start)))
-        .collect();
-    let first: Vec<Fit> = starts
-        .into_par_iter()
-        .map(|(term, start)| problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Some(&slopes)))
-        .collect();
-    improved(problem, first, &[(14, 3), (9, 5)])
+    let first = |terms: Vec<usize>| -> Vec<Fit> {
+        let starts: Vec<(usize, Vec<f64>)> = terms
+            .into_iter()
+            .flat_map(|term| problem.starts(base, term).into_iter().map(move |start| (term, start)))
+            .collect();
+        starts
+            .into_par_iter()
+            .map(|(term, start)| problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Some(&slopes)))
+            .collect()
+    };
+    let forms = (0..problem.terms.len()).filter(|term| !problem.terms[*term].law).collect();
+    let tried = first(forms);
+    let mut known: Vec<Option<Vec<Vec<f64>>>> = vec![None; problem.terms.len()];
+    for fit in &tried {
+        let term = &problem.terms[fit.terms[0]];
+        if !term.parameters.iter().all(|p| p.amplitude) {
+            known[fit.terms[0]].get_or_insert_with(Vec::new).push(fit.p[base.p.len()..].to_vec());
+        }
+    }
+    let mut fits = improved(problem, tried, &[(16, 3)]);
+    // The laws of the effects that lead: a law bends as its columns cannot.
+    let leading: Vec<&str> = fits.iter().take(PARENTS).map(|fit| problem.terms[fit.terms[0]].effect).collect();
+    let laws = |term: &usize| problem.terms[*term].law && leading.contains(&problem.terms[*term].effect);
+    fits.extend(first((0..problem.terms.len()).filter(laws).collect()));
+    (improved(problem, fits, &[(10, 5)]), known)
+}
+
+/// The set with each of its terms in the form that can be exported.
+pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
+    let mut current = fit.clone();
+    for place in 0..fit.terms.len() {
+        let term = current.terms[place];
+        let effect = problem.terms[term].effect;
+        if problem.terms[term].export.is_some() && (problem.terms[term].law || problem.terms[term].columns.is_none()) {
+            continue;
+        }
+        let Some(law) = (0..problem.terms.len()).find(|t| problem.terms[*t].law && problem.terms[*t].effect == effect) else {
+            continue;
+        };
+        // Out with the columns, in with the law, at the end of the parameters.
+        let base = problem.baseline.free.len();
+        let from = base + current.terms[..place].iter().map(|t| problem.terms[*t].parameters.len()).sum::<usize>();
+        let count = problem.terms[term].parameters.len();
+        let mut others = current.clone();
+        others.p.drain(from..from + count);
+        others.terms.remove(place);
+        let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
+        let starts = problem.starts(&others, law);
+        let fits = starts.into_par_iter().map(|s| problem.fit(&terms, [others.p.as_slice(), &s].concat(), 8, None));
+        if let Some(best) = fits.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
+            // The places of the others have moved by one: the law stands last.
+            current = problem.fit(&best.terms, best.p, 8, None);
+            return as_laws(problem, &current);
+        }
+    }
+    current
 }
 
 /// Linearised gain in evidence of each term beside a fit, with the values at which it starts.
-fn table(problem: &Problem<'_>, parent: &Fit, slopes: &Slopes) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
+fn table(problem: &Problem<'_>, parent: &Fit, slopes: &Slopes, known: &[Option<Vec<Vec<f64>>>]) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
     let w = problem.weights(&parent.r);
     let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
-    let others: Vec<usize> = (0..problem.terms.len()).filter(|t| !has(problem.terms[*t].effect)).collect();
+    let others: Vec<usize> = (0..problem.terms.len()).filter(|t| !problem.terms[*t].law && !has(problem.terms[*t].effect)).collect();
     // Columns of each other term, and the points that they stand for where it is not linear.
     let blocks: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> = others
         .par_iter()
@@ -172,7 +222,8 @@ fn table(problem: &Problem<'_>, parent: &Fit, slopes: &Slopes) -> Vec<(f64, usiz
                 let j = problem.term_columns(slopes, &terms, &p, &parent.r);
                 (j, Vec::new())
             } else {
-                let starts = problem.starts(parent, term);
+                // A grid is gone through once, beside the baseline; then only near what was best there.
+                let starts = known[term].clone().unwrap_or_else(|| problem.starts(parent, term));
                 let columns = starts
                     .iter()
                     .map(|start| {
@@ -235,12 +286,12 @@ fn table(problem: &Problem<'_>, parent: &Fit, slopes: &Slopes) -> Vec<(f64, usiz
     out
 }
 
-fn children(problem: &Problem<'_>, parents: &[Fit]) -> Vec<Fit> {
+fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Vec<Vec<f64>>>]) -> Vec<Fit> {
     let mut candidates: Vec<(f64, Vec<usize>, Vec<Vec<f64>>)> = Vec::new();
     for parent in parents {
         let level = problem.log_evidence(parent);
         let slopes = problem.slopes(&parent.terms, &parent.p, &parent.r);
-        for (gain, term, starts) in table(problem, parent, &slopes) {
+        for (gain, term, starts) in table(problem, parent, &slopes, known) {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
             let starts = starts.into_iter().map(|s| [parent.p.as_slice(), &s].concat()).collect();
             candidates.push((level + gain, terms, starts));

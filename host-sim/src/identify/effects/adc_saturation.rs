@@ -1,11 +1,11 @@
 //! `adc_saturation`: a channel clips.
 
-use super::{ContactView, Effect};
+use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
-pub struct AdcSaturation;
+pub(super) struct AdcSaturation;
 
 /// A clipped end holds at least this share of a channel's samples, …
 const LEAST_SHARE: f64 = 0.004;
@@ -24,8 +24,12 @@ fn end(values: &mut Vec<f64>, noise: f64) -> Option<f64> {
 }
 
 impl Effect for AdcSaturation {
-    fn id(&self) -> &'static str {
-        "adc_saturation"
+    fn about(&self) -> About {
+        About {
+            id: "adc_saturation",
+            meaning: "a channel clips",
+            experiment: "repeat the run at half the load: the flat top must go",
+        }
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -49,6 +53,9 @@ impl Effect for AdcSaturation {
         let start = parameters.iter().map(|p| p.mean).collect();
         vec![ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
             change.ends_nm = Some((-p[1] * scale, p[0] * scale));
+        })
+        .exported(move |p, _| {
+            vec![("friction_low_nm".into(), -p[1] * scale), ("friction_high_nm".into(), p[0] * scale)]
         })]
     }
 }

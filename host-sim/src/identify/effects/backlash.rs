@@ -1,15 +1,19 @@
 //! `backlash`: a dead zone in the coupling of motor and disc.
 
-use super::{DriveView, Effect};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::two_mass::{TwoMass, alternatives};
 
 /// The effect.
-pub struct Backlash;
+pub(super) struct Backlash;
 
 impl Effect for Backlash {
-    fn id(&self) -> &'static str {
-        "backlash"
+    fn about(&self) -> About {
+        About {
+            id: "backlash",
+            meaning: "disc and motor are coupled with a dead zone",
+            experiment: "reverse the lifted disc slowly with small torques",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {

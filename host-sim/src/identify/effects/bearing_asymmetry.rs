@@ -1,16 +1,20 @@
 //! `bearing_asymmetry`: the bearing's Coulomb or viscous friction differs per direction.
 
-use super::{DriveView, Effect};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct BearingAsymmetry;
+pub(super) struct BearingAsymmetry;
 
 impl Effect for BearingAsymmetry {
-    fn id(&self) -> &'static str {
-        "bearing_asymmetry"
+    fn about(&self) -> About {
+        About {
+            id: "bearing_asymmetry",
+            meaning: "the bearing's friction differs per direction",
+            experiment: "turn the lifted disc steadily at three speeds each way, and rest it: at rest an offset shows and an asymmetry does not",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {

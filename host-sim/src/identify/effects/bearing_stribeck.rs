@@ -1,25 +1,28 @@
 //! `bearing_stribeck`: the bearing's friction falls with speed near zero.
 
-use super::{DriveView, Effect};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct BearingStribeck;
+pub(super) struct BearingStribeck;
 
 /// Stribeck speeds that are tried, in shares of the usual speed.
 const SPEEDS: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.8];
 
 impl Effect for BearingStribeck {
-    fn id(&self) -> &'static str {
-        "bearing_stribeck"
+    fn about(&self) -> About {
+        About {
+            id: "bearing_stribeck",
+            meaning: "the bearing's friction falls with speed near zero",
+            experiment: "turn the lifted disc steadily at eight speeds from 0.1 to 10 rad/s",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let s = view.scales;
-        let shape = |share: f64| {
-            let at = share * s.speed;
+        let shape = |at: f64| {
             let column = view.logs.iter().flat_map(|log| {
                 let fall: Vec<f64> =
                     direction(log, s.speed).iter().zip(&log.speed).map(|(d, v)| d * (-v.abs() / at).exp()).collect();
@@ -33,6 +36,7 @@ impl Effect for BearingStribeck {
                 ..Alternative::columns("bearing_stribeck", parameters, vec![column.collect()])
             }
         };
-        SPEEDS.into_iter().map(shape).collect()
+        let grid = SPEEDS.map(|share| share * s.speed).to_vec();
+        super::shapes(view.fixed, "stribeck_speed", grid).into_iter().map(shape).collect()
     }
 }

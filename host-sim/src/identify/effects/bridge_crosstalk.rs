@@ -1,15 +1,20 @@
 //! `bridge_crosstalk`: the friction bridge picks up normal force, whatever the direction.
 
-use super::{ContactView, Effect};
+use super::{About, ContactView, DriveView, Effect};
+use crate::identify::balance::Alternative;
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct BridgeCrosstalk;
+pub(super) struct BridgeCrosstalk;
 
 impl Effect for BridgeCrosstalk {
-    fn id(&self) -> &'static str {
-        "bridge_crosstalk"
+    fn about(&self) -> About {
+        About {
+            id: "bridge_crosstalk",
+            meaning: "the friction bridge picks up normal force",
+            experiment: "press from 10 to 160 N at rest with the disc free to turn",
+        }
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -20,6 +25,26 @@ impl Effect for BridgeCrosstalk {
         };
         let columns = [1, 2].map(power).to_vec();
         let parameters = vec![Parameter::amplitude("gain", 1.0), Parameter::amplitude("bend", 0.5)];
-        vec![ContactTerm::shown(self.id(), "", columns, parameters)]
+        let export = move |p: &[f64]| {
+            let names = ["gain_nm_per_n", "bend_nm_per_n2"].map(String::from);
+            names.into_iter().zip([p[0] * torque / load, p[1] * torque / (load * load)]).collect()
+        };
+        vec![ContactTerm::shown(self.id(), "", columns, parameters).exported(move |p, _| export(p))]
+    }
+
+    fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
+        let s = view.scales;
+        if s.load_n <= 0.0 {
+            return Vec::new();
+        }
+        let power = |n: i32| {
+            let of = |log: &super::DriveLog| {
+                let load = log.load_n.clone().unwrap_or_else(|| vec![0.0; log.len()]);
+                log.filtered(&load.iter().map(|x| -(x / s.load_n).powi(n)).collect::<Vec<_>>())
+            };
+            view.logs.iter().flat_map(of).collect()
+        };
+        let parameters = ["gain_nm", "bend_nm"].map(|name| Parameter::amplitude(name, s.effort)).to_vec();
+        vec![Alternative::columns(self.id(), parameters, vec![power(1), power(2)])]
     }
 }

@@ -1,15 +1,23 @@
 //! `direction_asymmetry`: µ differs between the two directions of sliding.
+//!
+//! Coordinate: direction, with powers of ln speed. Law: the core's ([`model_core::extension::direction_asymmetry`]).
 
-use super::{ContactView, Effect};
+use model_core::extension::direction_asymmetry::DirectionAsymmetry as Law;
+
+use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
-use crate::identify::term::Parameter;
+use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
-pub struct DirectionAsymmetry;
+pub(super) struct DirectionAsymmetry;
 
 impl Effect for DirectionAsymmetry {
-    fn id(&self) -> &'static str {
-        "direction_asymmetry"
+    fn about(&self) -> About {
+        About {
+            id: "direction_asymmetry",
+            meaning: "friction differs between the two directions of sliding",
+            experiment: "slide to and fro at 10, 30 and 120 rpm under one load",
+        }
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -20,6 +28,38 @@ impl Effect for DirectionAsymmetry {
         let columns = [0, 1, 2].map(by_speed).to_vec();
         let parameters = [("asymmetry", 1.0), ("with_speed", 0.7), ("with_speed_squared", 0.5)];
         let parameters = parameters.map(|(name, sd)| Parameter::amplitude(name, sd)).to_vec();
-        vec![ContactTerm::factor(self.id(), "", columns, parameters)]
+
+        let usual = view.scales.speed_m_s;
+        let values = move |p: &[f64]| {
+            let share = |x: f64| x.clamp(-0.95, 0.95);
+            [share(p[0]), share(p[1]), (p[2].exp() * usual).clamp(1e-6, 1e3), p[3].exp().clamp(0.1, 4.0)]
+        };
+        let motion: Vec<Vec<(f64, f64)>> = view
+            .logs
+            .iter()
+            .zip(view.coordinates)
+            .map(|(log, c)| c.direction.iter().copied().zip(log.root_speed_m_s.iter().copied()).collect())
+            .collect();
+        let law = vec![
+            Parameter::amplitude("asymmetry_slow", 0.5),
+            Parameter::amplitude("asymmetry_fast", 0.5),
+            Parameter::logarithm("between", 0.3, 1.0),
+            Parameter::logarithm("sharpness", 1.0, 0.5),
+        ];
+        let starts = [(0.05, 0.05), (-0.05, -0.05), (0.05, -0.05), (-0.05, 0.05)];
+        let starts = starts.map(|(slow, fast)| vec![slow, fast, 0.3f64.ln(), 0.0]).to_vec();
+        let act = move |p: &[f64], change: &mut super::Change| {
+            let Ok(law) = Law::new(&values(p)) else { return };
+            // The core takes the force's sign; between the directions the measured direction goes through zero.
+            let of = |(direction, speed): &(f64, f64)| (1.0 + (law.factor(1.0, *speed) - 1.0) * direction).ln();
+            let column = motion.iter().map(|log| log.iter().map(of).collect()).collect();
+            change.add_log_factor(&[column], &[1.0]);
+        };
+        let law = ContactTerm::any(self.id(), law, Starts::BestOf(starts, 2), act).as_law();
+        let names = Law::<f64>::NAMES;
+        vec![
+            ContactTerm::factor(self.id(), "", columns, parameters),
+            law.exported(move |p, _| names.iter().map(ToString::to_string).zip(values(p)).collect()),
+        ]
     }
 }

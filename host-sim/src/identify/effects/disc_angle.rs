@@ -1,18 +1,24 @@
 //! `disc_angle`: µ varies with the disc's angle, a few orders per revolution.
 
-use super::{ContactView, Effect};
+use model_core::extension::disc_angle::DiscAngle as Law;
+
+use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::term::{Column, Parameter};
 
 /// The effect.
-pub struct DiscAngle;
+pub(super) struct DiscAngle;
 
 /// Orders per revolution.
 const ORDERS: usize = 8;
 
 impl Effect for DiscAngle {
-    fn id(&self) -> &'static str {
-        "disc_angle"
+    fn about(&self) -> About {
+        About {
+            id: "disc_angle",
+            meaning: "friction varies with the disc's angle",
+            experiment: "turn steadily at 10 and at 30 rpm for ten revolutions each under one load, from one switch-on of the encoder",
+        }
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -41,7 +47,17 @@ impl Effect for DiscAngle {
                         }
                     }
                 }
-                ContactTerm::factor(self.id(), form, columns, parameters)
+                let export = |p: &[f64]| -> Vec<(String, f64)> {
+                    let mut out = vec![("origin_rad".to_string(), 0.0)];
+                    for order in 0..Law::<f64>::NAMES.len() / 2 {
+                        for (i, name) in ["cos", "sin"].into_iter().enumerate() {
+                            let value = if order < ORDERS { p[2 * order + i] } else { 0.0 };
+                            out.push((format!("{name}{}", order + 1), value.clamp(-1.0, 1.0)));
+                        }
+                    }
+                    out
+                };
+                ContactTerm::factor(self.id(), form, columns, parameters).exported(move |p, _| export(p))
             })
             .collect()
     }

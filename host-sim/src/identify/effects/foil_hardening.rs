@@ -1,15 +1,19 @@
 //! `foil_hardening`: the spring force grows faster than linearly.
 
-use super::{Effect, PressView};
+use super::{About, Effect, PressView};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct FoilHardening;
+pub(super) struct FoilHardening;
 
 impl Effect for FoilHardening {
-    fn id(&self) -> &'static str {
-        "foil_hardening"
+    fn about(&self) -> About {
+        About {
+            id: "foil_hardening",
+            meaning: "the springs' force grows faster than linearly",
+            experiment: "ramp M1's torque slowly over its whole range",
+        }
     }
 
     fn press(&self, view: &PressView<'_>) -> Vec<Alternative> {

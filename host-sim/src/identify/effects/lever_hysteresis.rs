@@ -1,14 +1,14 @@
 //! `lever_hysteresis`: normal force lags M1 torque by a Coulomb band.
 
-use super::{Effect, PressView};
+use super::{About, Effect, PressView};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct LeverHysteresis;
+pub(super) struct LeverHysteresis;
 
 /// Widths of the play, in shares of the usual load.
-const WIDTHS: [f64; 3] = [0.03, 0.1, 0.3];
+const WIDTHS: [f64; 6] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.8];
 
 /// A play operator: follows its input at a distance of at most `width`.
 pub(in crate::identify) fn play(values: &[f64], width: f64) -> Vec<f64> {
@@ -23,8 +23,12 @@ pub(in crate::identify) fn play(values: &[f64], width: f64) -> Vec<f64> {
 }
 
 impl Effect for LeverHysteresis {
-    fn id(&self) -> &'static str {
-        "lever_hysteresis"
+    fn about(&self) -> About {
+        About {
+            id: "lever_hysteresis",
+            meaning: "the normal force lags M1's torque by a Coulomb band",
+            experiment: "ramp M1's torque slowly up and down, in loops of three sizes",
+        }
     }
 
     fn press(&self, view: &PressView<'_>) -> Vec<Alternative> {

@@ -1,82 +1,55 @@
 //! `m2_ripple`: M2's torque ripples with its angle (cogging orders).
+//!
+//! Coordinate: angle, or position of a stage. Columns: the orders at which what the base leaves has lines; one phase for all
+//! logs, or one for each, since an incremental encoder has its zero where it was switched on.
 
-use super::waves;
-use super::{DriveView, Effect};
+use super::waves::{self, Waves};
+use super::{About, DriveView, Effect, fixed_orders};
 use crate::identify::balance::Alternative;
-use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct M2Ripple;
+pub(super) struct M2Ripple;
 
 /// Highest order per revolution: cogging of the common motors ends at a few hundred.
 const HIGHEST_ORDER: usize = 240;
+/// Periods over a stage's travel.
+const MOST_PERIODS: usize = 120;
 /// Most orders at once.
 const MOST_ORDERS: usize = 8;
 /// A line's power over the median of all: of white noise the largest of 240 is 8 times it, coloured noise has more.
 const OVER_MEDIAN: f64 = 25.0;
 
 impl Effect for M2Ripple {
-    fn id(&self) -> &'static str {
-        "m2_ripple"
+    fn about(&self) -> About {
+        About {
+            id: "m2_ripple",
+            meaning: "M2's torque ripples with its angle",
+            experiment: "turn the lifted disc steadily at 5 and at 30 rpm for ten revolutions",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
-        let rows = view.balance.rows_of_logs();
-        let positions: Vec<f64> = view.logs.iter().flat_map(|log| log.position.iter().copied()).collect();
-        let picked = |values: &[f64]| -> Vec<Vec<f64>> {
-            rows.iter().map(|rows| rows.iter().map(|i| values[*i]).collect()).collect()
+        let positions: Vec<&[f64]> = view.logs.iter().map(|log| log.position.as_slice()).collect();
+        let make = Waves {
+            effect: self.id(),
+            positions: &positions,
+            filtered: &|at, values| view.logs[at].filtered(values),
+            size: view.scales.own,
+            rotary: view.rotary,
         };
-        let (x, r) = (picked(&positions), picked(view.residual));
-        let logs: Vec<(&[f64], &[f64])> = x.iter().zip(&r).map(|(x, r)| (x.as_slice(), r.as_slice())).collect();
+        if let Some(fixed) = view.fixed {
+            return make.alternatives(&fixed_orders(fixed), 1);
+        }
+        let (x, r) = waves::picked(view.balance, &positions.concat(), view.residual);
         let candidates: Vec<f64> = if view.rotary {
             // A wave must not turn by more than a third of its period from row to row.
             let fastest = view.scales.speed * view.balance.row_step_s;
             (1..=HIGHEST_ORDER).map(|k| k as f64).filter(|k| k * fastest < 2.0).collect()
         } else {
-            waves::of_travel(waves::travel(positions.iter().copied()), 60)
+            waves::of_travel(x.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max), MOST_PERIODS)
         };
-        let found = waves::lines(&logs, &candidates, MOST_ORDERS, OVER_MEDIAN);
-        let mut all = Vec::new();
-        for count in [1, 2, 4, MOST_ORDERS].into_iter().filter(|c| *c <= found.len().next_power_of_two()) {
-            let orders = &found[..count.min(found.len())];
-            if !orders.is_empty() {
-                all.push(waves_of(view, orders, candidates.len()));
-            }
-        }
-        all
-    }
-}
-
-/// Waves of these orders, for each log its own phase: an incremental encoder has its zero where it was switched on.
-fn waves_of(view: &DriveView<'_>, orders: &[f64], candidates: usize) -> Alternative {
-    let (mut columns, mut parameters) = (Vec::new(), Vec::new());
-    for at in 0..view.logs.len() {
-        for (i, order) in orders.iter().enumerate() {
-            for (name, sine) in [("cos", false), ("sin", true)] {
-                let column = view.logs.iter().enumerate().flat_map(|(other, log)| {
-                    if other != at {
-                        return vec![0.0; log.len()];
-                    }
-                    let wave = |x: &f64| if sine { (order * x).sin() } else { (order * x).cos() };
-                    log.filtered(&log.position.iter().map(wave).collect::<Vec<_>>())
-                });
-                columns.push(column.collect());
-                parameters.push(Parameter::amplitude(format!("{name}_{}_log{}", i + 1, at + 1), view.scales.own));
-            }
-        }
-    }
-    let constants = orders
-        .iter()
-        .enumerate()
-        .map(|(i, k)| {
-            if view.rotary { (format!("order_{}", i + 1), *k) } else { (format!("wavelength_{}_m", i + 1), std::f64::consts::TAU / k) }
-        })
-        .collect();
-    Alternative {
-        form: format!("{} orders", orders.len()),
-        constants,
-        // The orders were chosen among so many.
-        log_prior: -(orders.len() as f64) * (candidates as f64).ln(),
-        ..Alternative::columns("m2_ripple", parameters, columns)
+        let found = waves::lines(&x, &r, &candidates, MOST_ORDERS, OVER_MEDIAN);
+        let counts = [1, 2, 4, MOST_ORDERS].into_iter().filter(|count| *count < 2 * found.len().max(1));
+        counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], candidates.len())).collect()
     }
 }

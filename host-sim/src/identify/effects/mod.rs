@@ -4,7 +4,7 @@ pub mod coordinates;
 pub mod waves;
 
 use crate::identify::balance::{Alternative, Balance};
-use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::change::{Change, ContactTerm};
 use crate::identify::contact::log::ContactLog;
 use crate::identify::drive::{DriveLog, DriveScales};
 use crate::identify::press::{PressLog, PressScales};
@@ -40,6 +40,25 @@ pub struct DriveView<'a> {
     pub rotary: bool,
     /// What the base makes of the inertia.
     pub inertia: f64,
+    /// Shape found on other logs: only this one is wanted.
+    pub fixed: Option<&'a [(String, f64)]>,
+}
+
+/// Shapes that are tried: those of a grid, or the one that was found on other logs.
+pub(super) fn shapes(fixed: Option<&[(String, f64)]>, name: &str, grid: Vec<f64>) -> Vec<f64> {
+    let given = fixed.and_then(|f| f.iter().find(|(key, _)| key == name)).map(|(_, value)| *value);
+    given.map_or(grid, |value| vec![value])
+}
+
+/// The wave numbers of a shape found on other logs.
+pub(super) fn fixed_orders(fixed: &[(String, f64)]) -> Vec<f64> {
+    fixed
+        .iter()
+        .filter_map(|(name, value)| {
+            let length = name.starts_with("wavelength");
+            (length || name.starts_with("order")).then(|| if length { std::f64::consts::TAU / value } else { *value })
+        })
+        .collect()
 }
 
 /// The logs of a press, and what columns are made from.
@@ -52,12 +71,30 @@ pub struct PressView<'a> {
     pub balance: &'a Balance,
     /// What the base leaves of it.
     pub residual: &'a [f64],
+    /// Shape found on other logs: only this one is wanted.
+    pub fixed: Option<&'a [(String, f64)]>,
+}
+
+/// What an effect's file tells of it.
+#[derive(Debug, Clone, Copy)]
+pub struct About {
+    /// Its id.
+    pub id: &'static str,
+    /// What it means, as a clause.
+    pub meaning: &'static str,
+    /// The experiment that would confirm it.
+    pub experiment: &'static str,
 }
 
 /// All that is known of an effect.
 pub trait Effect: Sync {
+    /// Its id and what to tell of it.
+    fn about(&self) -> About;
+
     /// Its id.
-    fn id(&self) -> &'static str;
+    fn id(&self) -> &'static str {
+        self.about().id
+    }
 
     /// What it changes in the contact's balance, in one or more forms.
     fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {

@@ -1,13 +1,13 @@
 //! `presliding`: the bearing yields elastically before it slides (reversals).
 
 use super::waves::travel;
-use super::{DriveView, Effect};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::{COULOMB, direction};
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct Presliding;
+pub(super) struct Presliding;
 
 /// Yield lengths that are tried, in shares of the travel, a factor of two apart; and in radians at most.
 const LENGTHS: usize = 9;
@@ -15,15 +15,18 @@ const LENGTHS: usize = 9;
 const LONGEST: f64 = 0.1;
 
 impl Effect for Presliding {
-    fn id(&self) -> &'static str {
-        "presliding"
+    fn about(&self) -> About {
+        About {
+            id: "presliding",
+            meaning: "the bearing yields elastically before it slides",
+            experiment: "reverse the lifted disc slowly with amplitudes of 1, 10 and 100 mrad",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let reach = view.logs.iter().map(|log| travel(log.position.iter().copied())).fold(0.0, f64::max);
         let longest = LONGEST * if view.rotary { reach.min(3.0) } else { reach };
-        let shape = |i: usize| {
-            let length = longest * 0.5f64.powi(i as i32);
+        let shape = |length: f64| {
             // Dahl's spring: it follows the motion and fades towards the direction's sign.
             let state: Vec<f64> = view
                 .logs
@@ -49,6 +52,7 @@ impl Effect for Presliding {
                 ..Alternative::columns("presliding", vec![Parameter::amplitude("sliding_at_once", view.scales.own)], vec![sliding])
             }
         };
-        (0..LENGTHS).map(shape).collect()
+        let grid = (0..LENGTHS).map(|i| longest * 0.5f64.powi(i as i32)).collect();
+        super::shapes(view.fixed, "yield_length", grid).into_iter().map(shape).collect()
     }
 }

@@ -1,15 +1,19 @@
 //! `shaft_torsion`: disc and motor are coupled by a torsional spring: a two-mass resonance.
 
-use super::{DriveView, Effect};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::two_mass::{TwoMass, alternatives};
 
 /// The effect.
-pub struct ShaftTorsion;
+pub(super) struct ShaftTorsion;
 
 impl Effect for ShaftTorsion {
-    fn id(&self) -> &'static str {
-        "shaft_torsion"
+    fn about(&self) -> About {
+        About {
+            id: "shaft_torsion",
+            meaning: "disc and motor are coupled by a torsional spring",
+            experiment: "drive the lifted disc with a torque sweep from 2 to 100 Hz",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {

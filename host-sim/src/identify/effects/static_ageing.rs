@@ -1,16 +1,20 @@
 //! `static_ageing`: breakaway grows with the time at rest, about with its logarithm.
 
-use super::{ContactView, Effect};
+use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::contact::law::Ageing;
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
-pub struct StaticAgeing;
+pub(super) struct StaticAgeing;
 
 impl Effect for StaticAgeing {
-    fn id(&self) -> &'static str {
-        "static_ageing"
+    fn about(&self) -> About {
+        About {
+            id: "static_ageing",
+            meaning: "breakaway grows with the time at rest",
+            experiment: "rest for 0.1, 1, 10 and 100 s under one load, each time followed by the same slow start",
+        }
     }
 
     fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -20,9 +24,14 @@ impl Effect for StaticAgeing {
             vec![growth, Parameter::logarithm("onset_s", 0.1, 1.5), Parameter::logarithm("memory_m", 1e-3, 1.5)];
         let (onset, memory) = (0.1f64.ln(), 1e-3f64.ln());
         let starts = [(-1.0, -1.5), (-1.0, 1.0), (1.5, -1.5), (1.5, 1.0)];
-        let starts = starts.map(|(a, b)| vec![0.05, onset + a, memory + b]).to_vec();
+        let starts = starts.map(|(a, b)| vec![0.01, onset + a, memory + b]).to_vec();
         vec![ContactTerm::any(self.id(), parameters, Starts::At(starts), |p, change| {
             change.ageing = Some(Ageing { growth: p[0], onset_s: p[1].exp(), renewal_m: p[2].exp(), first_age_s: 1.0 });
+        })
+        .exported(|p, _| {
+            let names = ["growth", "onset_s", "memory_m", "first_age_s"].map(String::from);
+            let values = [p[0].clamp(0.0, 10.0), p[1].exp().clamp(1e-4, 1e4), p[2].exp().clamp(1e-6, 1.0), 1.0];
+            names.into_iter().zip(values).collect()
         })]
     }
 }

@@ -1,15 +1,19 @@
 //! `torque_offset`: the commanded torque has a constant offset.
 
-use super::{DriveView, Effect};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
 
 /// The effect.
-pub struct TorqueOffset;
+pub(super) struct TorqueOffset;
 
 impl Effect for TorqueOffset {
-    fn id(&self) -> &'static str {
-        "torque_offset"
+    fn about(&self) -> About {
+        About {
+            id: "torque_offset",
+            meaning: "the commanded torque has a constant offset",
+            experiment: "rest the lifted disc and find the torques at which it begins to turn either way",
+        }
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {

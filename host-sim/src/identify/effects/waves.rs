@@ -2,16 +2,22 @@
 
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
+
+use crate::identify::balance::{Alternative, Balance};
+use crate::identify::term::Parameter;
+
 /// Wave numbers (radians per unit of position) at which a residual has a line, the strongest first, at most `most`.
 ///
 /// `candidates` are tried one after the other on what the stronger ones leave; powers add up over the logs, since logs need
 /// not share the position's zero. A line counts where its power is `over` times the median one.
-pub fn lines(logs: &[(&[f64], &[f64])], candidates: &[f64], most: usize, over: f64) -> Vec<f64> {
-    let mut left: Vec<Vec<f64>> = logs.iter().map(|(_, r)| r.to_vec()).collect();
+pub fn lines(x: &[Vec<f64>], r: &[Vec<f64>], candidates: &[f64], most: usize, over: f64) -> Vec<f64> {
+    let logs: Vec<(&Vec<f64>, &Vec<f64>)> = x.iter().zip(r).collect();
+    let mut left: Vec<Vec<f64>> = r.to_vec();
     let mut found = Vec::new();
     for _ in 0..most {
         let powers: Vec<f64> = candidates
-            .iter()
+            .par_iter()
             .map(|k| {
                 logs.iter()
                     .zip(&left)
@@ -35,7 +41,7 @@ pub fn lines(logs: &[(&[f64], &[f64])], candidates: &[f64], most: usize, over: f
         found.push(k);
         for ((x, _), r) in logs.iter().zip(&mut left) {
             let (c, s) = coefficients(x, r, k);
-            r.iter_mut().zip(*x).for_each(|(r, x)| {
+            r.iter_mut().zip(x.iter()).for_each(|(r, x)| {
                 let (sin, cos) = (k * x).sin_cos();
                 *r -= c * cos + s * sin;
             });
@@ -60,6 +66,69 @@ pub fn of_travel(travel: f64, periods: usize) -> Vec<f64> {
     (2..2 * periods).map(|i| TAU * 0.5 * i as f64 / travel.max(1e-12)).collect()
 }
 
+/// Position and residual at the rows of each log.
+pub fn picked(balance: &Balance, position: &[f64], residual: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    let at = |values: &[f64], rows: &[usize]| rows.iter().map(|i| values[*i]).collect::<Vec<f64>>();
+    let rows = balance.rows_of_logs();
+    (rows.iter().map(|rows| at(position, rows)).collect(), rows.iter().map(|rows| at(residual, rows)).collect())
+}
+
+/// Waves over a position as columns of a balance.
+pub struct Waves<'a> {
+    /// The effect's id.
+    pub effect: &'static str,
+    /// Position in each log.
+    pub positions: &'a [&'a [f64]],
+    /// A log's signal through the balance's filter.
+    pub filtered: &'a dyn Fn(usize, &[f64]) -> Vec<f64>,
+    /// A large amplitude.
+    pub size: f64,
+    /// Whether the position is an angle.
+    pub rotary: bool,
+}
+
+impl Waves<'_> {
+    /// Waves of these orders, chosen among `candidates`: with one phase for all logs, and with one for each.
+    pub fn alternatives(&self, orders: &[f64], candidates: usize) -> Vec<Alternative> {
+        if orders.is_empty() {
+            return Vec::new();
+        }
+        let own = (0..self.positions.len()).map(Some).collect();
+        let forms = [("one phase", vec![None]), ("a phase for each log", own)];
+        forms.into_iter().map(|(form, logs)| self.alternative(orders, candidates, form, &logs)).collect()
+    }
+
+    fn alternative(&self, orders: &[f64], candidates: usize, form: &str, logs: &[Option<usize>]) -> Alternative {
+        let (mut columns, mut parameters) = (Vec::new(), Vec::new());
+        for only in logs {
+            let log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
+            for (i, k) in orders.iter().enumerate() {
+                for (name, sine) in [("cos", false), ("sin", true)] {
+                    let column = self.positions.iter().enumerate().flat_map(|(at, x)| {
+                        if only.is_some_and(|only| only != at) {
+                            return vec![0.0; x.len()];
+                        }
+                        let wave = |x: &f64| if sine { (k * x).sin() } else { (k * x).cos() };
+                        (self.filtered)(at, &x.iter().map(wave).collect::<Vec<_>>())
+                    });
+                    columns.push(column.collect());
+                    parameters.push(Parameter::amplitude(format!("{name}_{}{log}", i + 1), self.size));
+                }
+            }
+        }
+        let constant = |(i, k): (usize, &f64)| {
+            if self.rotary { (format!("order_{}", i + 1), *k) } else { (format!("wavelength_{}", i + 1), TAU / k) }
+        };
+        Alternative {
+            form: format!("{} orders, {form}", orders.len()),
+            constants: orders.iter().enumerate().map(constant).collect(),
+            // The orders were chosen among so many.
+            log_prior: -(orders.len() as f64) * (candidates.max(1) as f64).ln(),
+            ..Alternative::columns(self.effect, parameters, columns)
+        }
+    }
+}
+
 /// Travel of a position.
 pub fn travel(values: impl Iterator<Item = f64>) -> f64 {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
@@ -77,6 +146,6 @@ mod tests {
         let r: Vec<f64> =
             x.iter().enumerate().map(|(i, x)| (5.0 * x).cos() + 0.4 * (12.0 * x).sin() + noise(i)).collect();
         let candidates: Vec<f64> = (1..40).map(f64::from).collect();
-        assert_eq!(lines(&[(&x, &r)], &candidates, 4, 60.0), [5.0, 12.0]);
+        assert_eq!(lines(&[x], &[r], &candidates, 4, 60.0), [5.0, 12.0]);
     }
 }
