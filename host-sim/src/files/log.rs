@@ -272,6 +272,24 @@ impl Log {
             .allowed(format!("this column in SI units; the file has {}", there.join(", ")))
     }
 
+    /// The log in two parts: the first share of its samples, and the rest.
+    #[must_use]
+    pub fn split(&self, share: f64) -> (Self, Self) {
+        let at = (share * self.len() as f64) as usize;
+        let part = |name: &str, from: usize, to: usize| {
+            let mut log = self.clone();
+            log.source = format!("{} ({name})", self.source);
+            for column in &mut log.columns {
+                column.cells = match &column.cells {
+                    Cells::Numbers(values) => Cells::Numbers(values[from..to].to_vec()),
+                    Cells::Text(values) => Cells::Text(values[from..to].to_vec()),
+                };
+            }
+            log
+        };
+        (part("first part", 0, at), part("last part", at, self.len()))
+    }
+
     /// Signals in the order in which the tool writes them, then all other columns.
     pub fn sort_columns(&mut self) {
         let rank = |name: &str| SIGNALS.iter().position(|s| s.column() == name).unwrap_or(SIGNALS.len());

@@ -28,6 +28,8 @@ pub struct Alternative {
     pub columns: Vec<Vec<f64>>,
     /// What is added to the response.
     pub response: Option<Vec<f64>>,
+    /// Angle of the disc in each log, where this form parts it from the motor's.
+    pub disc_position: Option<Vec<Vec<f64>>>,
     /// Base columns that this form replaces, by their place.
     pub replaces: Vec<(usize, Vec<f64>)>,
     /// Change of the prior means of base parameters.
@@ -47,6 +49,7 @@ impl Alternative {
             parameters,
             columns,
             response: None,
+            disc_position: None,
             replaces: Vec::new(),
             base_shift: Vec::new(),
             constants: Vec::new(),

@@ -277,5 +277,14 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
                 .map(|i| from + i),
         );
     }
-    Balance { response: concat(&response), base, first_deviation: deviation.clone(), deviation, used, temper: 3.0, row_step_s, starts }
+    Balance {
+        response: concat(&response),
+        base,
+        first_deviation: deviation.clone(),
+        deviation,
+        used,
+        temper: 3.0,
+        row_step_s,
+        starts,
+    }
 }

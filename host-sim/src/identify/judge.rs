@@ -5,12 +5,12 @@
 //! take for friction is decided by the drive, without a rule.
 
 use super::balance::{self, Alternative, Balance, Solved};
+use super::contact::baseline as contact_baseline;
 use super::contact::change::ContactTerm;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Baseline, Fit, Noise, Problem};
 use super::contact::search;
-use super::contact::baseline as contact_baseline;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
 use super::effects::{ContactView, DriveView, LIBRARY, PressView};
@@ -26,9 +26,11 @@ const MOST_AT_ONCE: usize = 2;
 /// ln of the prior probability that an effect of the library acts: one in fifty.
 const LOG_PRIOR: f64 = -3.9;
 /// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
-const EVIDENCE_SHARE: f64 = 0.1;
+pub const EVIDENCE_SHARE: f64 = 0.1;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
 const SIZE_WIDTH: f64 = 0.25 / 1.7;
+/// A simulated motion of the disc is taken where it leaves less than this share of what a rigid shaft leaves.
+const TRUSTED_MOTION: f64 = 0.3;
 /// Sets of each balance that enter the table.
 const CANDIDATES: usize = 12;
 
@@ -77,6 +79,10 @@ pub struct Linear {
     pub solved: Vec<Solved>,
     /// RMS of the response over its rows.
     pub signal: f64,
+    /// Scales of the drive's columns.
+    pub drive_scales: Option<DriveScales>,
+    /// Scales of the press's columns.
+    pub press_scales: Option<PressScales>,
 }
 
 /// The contact, searched.
@@ -110,7 +116,13 @@ impl ContactPart {
 }
 
 /// Terms of all effects for these logs.
-pub fn contact_terms(logs: &[ContactLog], scales: &Scales, training: bool, train_count: usize, block: bool) -> Vec<ContactTerm> {
+pub fn contact_terms(
+    logs: &[ContactLog],
+    scales: &Scales,
+    training: bool,
+    train_count: usize,
+    block: bool,
+) -> Vec<ContactTerm> {
     let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
     let view = ContactView { logs, coordinates: &coordinates, scales, training, train_count, block };
     LIBRARY.iter().flat_map(|effect| effect.contact(&view)).collect()
@@ -122,11 +134,19 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
     let mut balance = drive::balance(logs, prior, &scales);
     let base = balance.solve(&[], &[]);
     let inertia = base.p[drive::INERTIA];
-    let view = DriveView { logs, scales: &scales, balance: &balance, residual: &base.residual, rotary, inertia, fixed: None };
+    let view = DriveView {
+        logs,
+        scales: &scales,
+        balance: &balance,
+        residual: &base.residual,
+        rotary,
+        inertia,
+        fixed: None,
+    };
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.drive(&view)).collect();
     let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
     let signal = balance.rms(&balance.response);
-    Linear { balance, alternatives, solved, signal }
+    Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), press_scales: None }
 }
 
 /// The press's balance of these logs, searched.
@@ -138,7 +158,7 @@ pub fn search_press(logs: &[PressLog], rig: &RigFile) -> Linear {
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.press(&view)).collect();
     let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
     let signal = balance.rms(&balance.response);
-    Linear { balance, alternatives, solved, signal }
+    Linear { balance, alternatives, solved, signal, drive_scales: None, press_scales: Some(scales) }
 }
 
 impl Linear {
@@ -156,7 +176,8 @@ impl Linear {
                 .map(|a| {
                     let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
                     let without = self.balance.solve(&self.alternatives, &set);
-                    let size = self.balance.difference(&solved.residual, &without.residual) / self.signal.max(1e-12);
+                    let size =
+                        self.balance.difference(&solved.residual, &without.residual) / self.signal.max(1e-12);
                     (self.alternatives[*a].effect, size)
                 })
                 .collect();
@@ -231,26 +252,37 @@ pub fn real(size: f64) -> f64 {
 ///
 /// # Errors
 /// Where logs are of different kinds, or have nothing that can be analysed.
-pub fn judge(train: &[Log], rig: &RigFile, model: &ModelFile, told: &(dyn Fn(&str) + Sync)) -> Result<Judgement, InputError> {
+pub fn judge(
+    train: &[Log],
+    rig: &RigFile,
+    model: &ModelFile,
+    told: &(dyn Fn(&str) + Sync),
+) -> Result<Judgement, InputError> {
     let kinds = train.iter().map(Log::kind).collect::<Result<Vec<_>, _>>()?;
     if kinds.windows(2).any(|k| k[0] != k[1]) {
-        return Err(InputError::new("logs of different kinds together").key("--train").allowed("contact logs, or drive logs"));
+        return Err(InputError::new("logs of different kinds together")
+            .key("--train")
+            .allowed("contact logs, or drive logs"));
     }
     let mut notes = Vec::new();
     let (mut contact, mut drive, mut press) = (None, None, None);
     let linear_stage = kinds.first() == Some(&LogKind::LinearDrive);
     if kinds.first() == Some(&LogKind::Contact) {
-        let logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
-        let drives: Vec<DriveLog> =
-            logs.iter().filter_map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
-        if drives.len() == logs.len() {
-            told("drive");
-            drive = Some(search_drive(&drives, &drive_prior(rig), true));
+        let mut logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+        let of_drive = |logs: &[ContactLog]| -> Option<Linear> {
+            let drives: Option<Vec<DriveLog>> =
+                logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
+            drives.map(|drives| search_drive(&drives, &drive_prior(rig), true))
+        };
+        told("drive");
+        drive = of_drive(&logs);
+        if let Some(found) = &drive {
+            follow_disc(&mut logs, found);
         } else {
             notes.push("no torque of M2: the drive is not looked at".to_string());
         }
-        let presses: Vec<PressLog> = logs.iter().filter_map(PressLog::new).collect();
-        if presses.len() == logs.len() {
+        let presses: Option<Vec<PressLog>> = logs.iter().map(PressLog::new).collect();
+        if let Some(presses) = presses {
             told("press");
             press = Some(search_press(&presses, rig));
         } else {
@@ -260,16 +292,28 @@ pub fn judge(train: &[Log], rig: &RigFile, model: &ModelFile, told: &(dyn Fn(&st
         let block = contact_baseline::has_block(model);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
         let baseline = contact_baseline::baseline(model, contact_baseline::KNOWN_WITHIN);
-        let (noise, ranked) = {
+        let (noise, ranked, ends) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, told);
-            (problem.noise.clone(), found.ranked)
+            let best = &found.ranked[0].fit;
+            let ends = problem.change(&best.terms, &best.p).ends_nm;
+            (problem.noise.clone(), found.ranked, ends)
         };
+        if let (Some(ends), true) = (ends, drive.is_some()) {
+            // Where the friction channel shows its end, the drive's balance has no friction torque.
+            let mut seen = logs.clone();
+            seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
+            drive = of_drive(&seen);
+        }
         contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked });
     } else {
         let logs = train.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
         told("drive");
-        drive = Some(search_drive(&logs, &DrivePrior { inertia: None, coulomb: None, viscous: None }, !linear_stage));
+        drive = Some(search_drive(
+            &logs,
+            &DrivePrior { inertia: None, coulomb: None, viscous: None },
+            !linear_stage,
+        ));
     }
     told("table of causes");
     let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
@@ -283,11 +327,34 @@ pub fn judge(train: &[Log], rig: &RigFile, model: &ModelFile, told: &(dyn Fn(&st
         parts.push((Part::Pressure, press.candidates()));
     }
     let (hypotheses, too_small) = table(&parts);
-    let mut judgement =
-        Judgement { contact, drive, press, hypotheses, too_small, unknown: 0.0, rests: Vec::new(), notes, linear_stage };
+    let mut judgement = Judgement {
+        contact,
+        drive,
+        press,
+        hypotheses,
+        too_small,
+        unknown: 0.0,
+        rests: Vec::new(),
+        notes,
+        linear_stage,
+    };
     judgement.rests = judgement.rests();
     judgement.unknown = judgement.rests.iter().map(|(_, rest)| rest.unknown()).fold(0.0, f64::max);
     Ok(judgement)
+}
+
+/// Lets the contact move with the disc, where the drive's best set parts it from the motor's encoder.
+fn follow_disc(logs: &mut [ContactLog], drive: &Linear) {
+    let Some(best) = drive.solved.first() else { return };
+    let none = drive.solved.iter().find(|s| s.set.is_empty()).map_or(best, |s| s);
+    // A motion that leaves much of the drive's torque unexplained is no better than the encoder's.
+    if drive.balance.rms(&best.residual) > TRUSTED_MOTION * drive.balance.rms(&none.residual) {
+        return;
+    }
+    let disc = best.set.iter().find_map(|a| drive.alternatives[*a].disc_position.as_ref());
+    for (log, position) in logs.iter_mut().zip(disc.into_iter().flatten()) {
+        log.follow(position);
+    }
 }
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
@@ -369,6 +436,24 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
     }
     all.iter_mut().for_each(|h| h.probability /= mass.max(1e-300));
     (all, too_small)
+}
+
+/// Coordinates of the contact with their units, all logs on end: what residuals are drawn over.
+pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<f64>)> {
+    let all: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
+    let signal = |of: &dyn Fn(&ContactLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let own = |of: &dyn Fn(&Coordinates) -> Vec<f64>| all.iter().flat_map(of).collect::<Vec<f64>>();
+    vec![
+        ("heat held, J".into(), own(&|c| c.heat_j[1].clone())),
+        ("distance slid, m".into(), own(&|c| c.distance_m.clone())),
+        ("normal force, N".into(), signal(&|log| log.load_n.clone())),
+        ("sliding speed, m/s".into(), signal(&|log| log.root_speed_m_s.clone())),
+        (
+            "disc angle, rad".into(),
+            signal(&|log| log.angle_rad.iter().map(|a| a.rem_euclid(std::f64::consts::TAU)).collect()),
+        ),
+        ("time, s".into(), signal(&|log| log.grid.time_s.clone())),
+    ]
 }
 
 /// What the drive is known to be by the rig file.

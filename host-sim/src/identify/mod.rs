@@ -1,15 +1,20 @@
 //! Identification and diagnosis: one likelihood for each balance of the rig, one table of causes.
 
 pub mod balance;
+pub mod command;
 pub mod contact;
 pub mod drive;
 pub mod effects;
+pub mod extended_model;
 pub mod filters;
 pub mod grid;
+pub mod holdout;
 pub mod judge;
 pub mod linear;
 pub mod noise;
+pub mod page;
 pub mod press;
 pub mod rest;
+pub mod results;
 pub mod term;
 pub mod two_mass;

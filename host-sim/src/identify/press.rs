@@ -160,5 +160,14 @@ pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balanc
     }
     let response = concat(&|log| log.filtered(&log.torque_nm));
     let row_step_s = EVERY as f64 * logs.iter().map(|log| log.step_s).fold(f64::INFINITY, f64::min);
-    Balance { response, base, first_deviation: deviation.clone(), deviation, used, temper: 3.0, row_step_s, starts }
+    Balance {
+        response,
+        base,
+        first_deviation: deviation.clone(),
+        deviation,
+        used,
+        temper: 3.0,
+        row_step_s,
+        starts,
+    }
 }

@@ -35,8 +35,8 @@ pub struct TwoMass {
     pub gap_rad: f64,
 }
 
-/// Shaft torque for a log.
-fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]) -> Vec<f64> {
+/// Shaft torque and angle of the disc for a log.
+fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let n = log.len();
     let dt = log.grid.step_s;
     let h = dt / SUBSTEPS as f64;
@@ -57,6 +57,7 @@ fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]
     let x = &log.position;
     let (mut q, mut w) = (x[0] - observed[0] / k, 0.0);
     let mut out = vec![0.0; n];
+    let mut disc_position = vec![q; n];
     for i in 1..n {
         let (before, now) =
             ((x[i] - x[i - 1]) / dt, if i + 1 < n { (x[i + 1] - x[i]) / dt } else { (x[i] - x[i - 1]) / dt });
@@ -89,10 +90,11 @@ fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]
             w += 0.06 * PULL * off / dt;
         }
         if !q.is_finite() || !w.is_finite() || q.abs() > 1e9 {
-            return vec![f64::NAN; n];
+            return (vec![f64::NAN; n], disc_position);
         }
+        disc_position[i] = q;
     }
-    out
+    (out, disc_position)
 }
 
 fn alternative(
@@ -110,9 +112,11 @@ fn alternative(
         return None;
     }
     let mut added = Vec::with_capacity(view.balance.response.len());
+    let mut positions = Vec::new();
     let mut from = 0;
     for log in view.logs {
-        let torque = shaft_torque(log, numbers, view.inertia, &bearing[from..from + log.len()]);
+        let (torque, disc_position) =
+            shaft_torque(log, numbers, view.inertia, &bearing[from..from + log.len()]);
         from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
@@ -125,6 +129,7 @@ fn alternative(
             return None;
         }
         added.extend(log.filtered(&change));
+        positions.push(disc_position);
     }
     let disc = numbers.disc_share * view.inertia;
     let omega = std::f64::consts::TAU * numbers.mode_hz;
@@ -140,6 +145,7 @@ fn alternative(
     Some(Alternative {
         form: format!("{:.0} Hz, gap {:.2e} rad", numbers.mode_hz, numbers.gap_rad),
         response: Some(added),
+        disc_position: Some(positions),
         base_shift: vec![(INERTIA, -disc)],
         constants,
         log_prior: -share.ln(),
@@ -156,7 +162,8 @@ pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMas
         let get = |name: &str| fixed.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
         let (disc, k, mode_hz) = (get("disc_inertia_kg_m2"), get("stiffness_nm_per_rad"), get("mode_hz"));
         let damping_ratio = get("damping_nm_s_per_rad") * std::f64::consts::PI * mode_hz / k.max(1e-12);
-        let numbers = TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
+        let numbers =
+            TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
         let bearing = view.balance.bearing(view.residual);
         return alternative(effect, view, &numbers, &bearing, 1.0).into_iter().collect();
     }

@@ -126,6 +126,29 @@ impl ContactLog {
         })
     }
 
+    /// Replaces the disc's angle by one that is known better.
+    pub fn follow(&mut self, angle_rad: &[f64]) {
+        let step_s = self.grid.step_s;
+        self.angle_rad = angle_rad.to_vec();
+        self.root_m = angle_rad.iter().map(|a| self.radius_m * a).collect();
+        let speed: Vec<f64> = gradient(&self.root_m).iter().map(|d| d / step_s).collect();
+        self.root_speed_m_s = gaussian(&speed, 3.0, 0);
+    }
+
+    /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.
+    pub fn leave_out_ends(&mut self, (low, high): (f64, f64)) {
+        const NOISES: f64 = 4.0;
+        const BEFORE: usize = 12;
+        const AFTER: usize = 25;
+        let near = NOISES * self.friction_noise_nm;
+        let last = self.len().saturating_sub(1);
+        for i in 0..self.len() {
+            if self.friction_nm[i] > high - near || self.friction_nm[i] < low + near {
+                self.usable[i.saturating_sub(BEFORE)..=(i + AFTER).min(last)].fill(false);
+            }
+        }
+    }
+
     /// Points of the grid.
     pub fn len(&self) -> usize {
         self.grid.len()

@@ -28,6 +28,8 @@ const BETWEEN_SAMPLES: f64 = 0.3;
 const TRANSITION: f64 = 0.03;
 /// Sources.
 const SOURCES: usize = 8;
+/// Place of the form of the model among them.
+const MODEL_FORM_SOURCE: usize = 4;
 /// Frequency below which effects live, Hz; above it residuals only tell how white they are.
 const SLOW_HZ: f64 = 30.0;
 
@@ -98,6 +100,13 @@ impl Noise {
         let mut noise = Self { deviation: Vec::new(), sources, temper: 3.0 / density, sensor_factor: 1.0 };
         noise.weigh(&[1.0; SOURCES]);
         noise
+    }
+
+    /// Deviation of a sample from its named sources before anything is fitted, the form of the model left out: what noise
+    /// alone leaves.
+    pub fn named(&self, sample: usize) -> f64 {
+        let n = &self.sources[sample];
+        n.iter().enumerate().filter(|(s, _)| *s != MODEL_FORM_SOURCE).map(|(_, n)| n).sum::<f64>().sqrt()
     }
 
     fn weigh(&mut self, factors: &[f64; SOURCES]) {

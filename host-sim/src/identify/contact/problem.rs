@@ -169,7 +169,12 @@ impl<'a> Problem<'a> {
     }
 
     /// With a noise model that was fitted before.
-    pub fn with_noise(logs: &'a [ContactLog], baseline: &'a Baseline, terms: &'a [ContactTerm], noise: Noise) -> Self {
+    pub fn with_noise(
+        logs: &'a [ContactLog],
+        baseline: &'a Baseline,
+        terms: &'a [ContactTerm],
+        noise: Noise,
+    ) -> Self {
         Self { logs, baseline, terms, noise }
     }
 

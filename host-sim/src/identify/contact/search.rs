@@ -136,7 +136,22 @@ fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
 fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]) -> Vec<Fit> {
     for &(keep, iterations) in rounds {
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        if std::env::var("STAGES").is_ok() { eprintln!("stage {keep} {iterations}: {:?}", fits.iter().map(|f| format!("{} {:.0}", f.terms.iter().map(|t| format!("{}/{}", problem.terms[*t].effect, problem.terms[*t].form)).collect::<Vec<_>>().join("+"), f.cost)).collect::<Vec<_>>()); }
+        if std::env::var("STAGES").is_ok() {
+            eprintln!(
+                "stage {keep} {iterations}: {:?}",
+                fits.iter()
+                    .map(|f| format!(
+                        "{} {:.0}",
+                        f.terms
+                            .iter()
+                            .map(|t| format!("{}/{}", problem.terms[*t].effect, problem.terms[*t].form))
+                            .collect::<Vec<_>>()
+                            .join("+"),
+                        f.cost
+                    ))
+                    .collect::<Vec<_>>()
+            );
+        }
         fits.truncate(keep);
         fits = fits.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, iterations, None)).collect();
     }
@@ -167,7 +182,8 @@ fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Vec<Vec<f
     }
     let mut fits = improved(problem, tried, &[(16, 3)]);
     // The laws of the effects that lead: a law bends as its columns cannot.
-    let leading: Vec<&str> = fits.iter().take(PARENTS).map(|fit| problem.terms[fit.terms[0]].effect).collect();
+    let leading: Vec<&str> =
+        fits.iter().take(PARENTS).map(|fit| problem.terms[fit.terms[0]].effect).collect();
     let laws = |term: &usize| problem.terms[*term].law && leading.contains(&problem.terms[*term].effect);
     fits.extend(first((0..problem.terms.len()).filter(laws).collect()));
     (improved(problem, fits, &[(10, 5)]), known)
@@ -179,22 +195,28 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
     for place in 0..fit.terms.len() {
         let term = current.terms[place];
         let effect = problem.terms[term].effect;
-        if problem.terms[term].export.is_some() && (problem.terms[term].law || problem.terms[term].columns.is_none()) {
+        if problem.terms[term].export.is_some()
+            && (problem.terms[term].law || problem.terms[term].columns.is_none())
+        {
             continue;
         }
-        let Some(law) = (0..problem.terms.len()).find(|t| problem.terms[*t].law && problem.terms[*t].effect == effect) else {
+        let Some(law) =
+            (0..problem.terms.len()).find(|t| problem.terms[*t].law && problem.terms[*t].effect == effect)
+        else {
             continue;
         };
         // Out with the columns, in with the law, at the end of the parameters.
         let base = problem.baseline.free.len();
-        let from = base + current.terms[..place].iter().map(|t| problem.terms[*t].parameters.len()).sum::<usize>();
+        let from =
+            base + current.terms[..place].iter().map(|t| problem.terms[*t].parameters.len()).sum::<usize>();
         let count = problem.terms[term].parameters.len();
         let mut others = current.clone();
         others.p.drain(from..from + count);
         others.terms.remove(place);
         let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
         let starts = problem.starts(&others, law);
-        let fits = starts.into_par_iter().map(|s| problem.fit(&terms, [others.p.as_slice(), &s].concat(), 8, None));
+        let fits =
+            starts.into_par_iter().map(|s| problem.fit(&terms, [others.p.as_slice(), &s].concat(), 8, None));
         if let Some(best) = fits.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
             // The places of the others have moved by one: the law stands last.
             current = problem.fit(&best.terms, best.p, 8, None);
@@ -205,11 +227,18 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
 }
 
 /// Linearised gain in evidence of each term beside a fit, with the values at which it starts.
-fn table(problem: &Problem<'_>, parent: &Fit, slopes: &Slopes, known: &[Option<Vec<Vec<f64>>>]) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
+fn table(
+    problem: &Problem<'_>,
+    parent: &Fit,
+    slopes: &Slopes,
+    known: &[Option<Vec<Vec<f64>>>],
+) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
     let w = problem.weights(&parent.r);
     let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
-    let others: Vec<usize> = (0..problem.terms.len()).filter(|t| !problem.terms[*t].law && !has(problem.terms[*t].effect)).collect();
+    let others: Vec<usize> = (0..problem.terms.len())
+        .filter(|t| !problem.terms[*t].law && !has(problem.terms[*t].effect))
+        .collect();
     // Columns of each other term, and the points that they stand for where it is not linear.
     let blocks: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> = others
         .par_iter()

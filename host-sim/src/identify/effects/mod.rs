@@ -56,7 +56,8 @@ pub(super) fn fixed_orders(fixed: &[(String, f64)]) -> Vec<f64> {
         .iter()
         .filter_map(|(name, value)| {
             let length = name.starts_with("wavelength");
-            (length || name.starts_with("order")).then(|| if length { std::f64::consts::TAU / value } else { *value })
+            (length || name.starts_with("order"))
+                .then(|| if length { std::f64::consts::TAU / value } else { *value })
         })
         .collect()
 }

@@ -70,7 +70,10 @@ pub fn of_travel(travel: f64, periods: usize) -> Vec<f64> {
 pub fn picked(balance: &Balance, position: &[f64], residual: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let at = |values: &[f64], rows: &[usize]| rows.iter().map(|i| values[*i]).collect::<Vec<f64>>();
     let rows = balance.rows_of_logs();
-    (rows.iter().map(|rows| at(position, rows)).collect(), rows.iter().map(|rows| at(residual, rows)).collect())
+    (
+        rows.iter().map(|rows| at(position, rows)).collect(),
+        rows.iter().map(|rows| at(residual, rows)).collect(),
+    )
 }
 
 /// Waves over a position as columns of a balance.
@@ -98,7 +101,13 @@ impl Waves<'_> {
         forms.into_iter().map(|(form, logs)| self.alternative(orders, candidates, form, &logs)).collect()
     }
 
-    fn alternative(&self, orders: &[f64], candidates: usize, form: &str, logs: &[Option<usize>]) -> Alternative {
+    fn alternative(
+        &self,
+        orders: &[f64],
+        candidates: usize,
+        form: &str,
+        logs: &[Option<usize>],
+    ) -> Alternative {
         let (mut columns, mut parameters) = (Vec::new(), Vec::new());
         for only in logs {
             let log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
@@ -117,7 +126,11 @@ impl Waves<'_> {
             }
         }
         let constant = |(i, k): (usize, &f64)| {
-            if self.rotary { (format!("order_{}", i + 1), *k) } else { (format!("wavelength_{}", i + 1), TAU / k) }
+            if self.rotary {
+                (format!("order_{}", i + 1), *k)
+            } else {
+                (format!("wavelength_{}", i + 1), TAU / k)
+            }
         };
         Alternative {
             form: format!("{} orders, {form}", orders.len()),

@@ -1,0 +1,234 @@
+//! `model-extended.toml`: the fitted baseline with the named effects in it, as the chip takes them.
+//!
+//! An effect of the contact is written in the core's parameters, by the law of its own file. What the core has no law for is a
+//! comment. For drive logs the drive's parameters under `kind = "drive"`.
+
+use std::collections::BTreeMap;
+
+use model_core::extension::Extension as CoreExtension;
+use nalgebra::DMatrix;
+
+use super::contact::baseline::has_block;
+use super::contact::problem::{Numbers, Problem};
+use super::contact::search;
+use super::judge::{ContactPart, Judgement, Linear, Part};
+use super::linear::{self, normal_equations};
+use crate::files::model_file::{Extension, ModelFile, ModelKind};
+use crate::files::number;
+use crate::input_error::InputError;
+
+/// Step of the finite differences that carry a covariance through a law.
+const STEP: f64 = 1e-3;
+
+/// A fitted number of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation; `None` where the logs do not determine it.
+    pub std: Option<f64>,
+}
+
+/// Parameters of each named effect, by its id.
+pub type Values = BTreeMap<&'static str, BTreeMap<String, Value>>;
+
+/// The extended contact: model, parameters of its effects.
+pub struct ExtendedContact {
+    /// The model, which the core runs.
+    pub model: ModelFile,
+    /// Parameters of the effects in the contact.
+    pub values: Values,
+}
+
+/// The contact's answer in the core's laws.
+///
+/// # Errors
+/// Where the model cannot take the fitted numbers.
+pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<ExtendedContact, InputError> {
+    let problem = part.problem();
+    let fit = search::as_laws(&problem, part.fit(place));
+    let base = part.baseline.free.len();
+    let covariance = covariance(&problem, &fit.terms, &fit.p, &fit.r);
+    let mut numbers = part.baseline.numbers(&fit.p);
+    let mut values = Values::new();
+    let mut extensions = Vec::new();
+    let mut at = base;
+    for &term in &fit.terms {
+        let term = &part.terms[term];
+        let count = term.parameters.len();
+        let own = &fit.p[at..at + count];
+        let exported: BTreeMap<String, Value> = match &term.export {
+            Some(export) => {
+                let before = numbers;
+                let named = export(own, &mut numbers);
+                let sensitivity: Vec<Vec<f64>> = (0..count)
+                    .map(|i| {
+                        let mut moved = own.to_vec();
+                        moved[i] += STEP;
+                        let other = export(&moved, &mut before.clone());
+                        named.iter().zip(other).map(|(a, b)| (b.1 - a.1) / STEP).collect()
+                    })
+                    .collect();
+                let std = |k: usize| {
+                    let mut sum = 0.0;
+                    for i in 0..count {
+                        for j in 0..count {
+                            sum += sensitivity[i][k] * sensitivity[j][k] * covariance[(at + i, at + j)];
+                        }
+                    }
+                    sum.max(0.0).sqrt()
+                };
+                let determined = |k: usize, value: f64| {
+                    Some(std(k)).filter(|s| s.is_finite() && (*s < value.abs() || value == 0.0))
+                };
+                named
+                    .iter()
+                    .enumerate()
+                    .map(|(k, (name, value))| {
+                        (name.clone(), Value { value: *value, std: determined(k, *value) })
+                    })
+                    .collect()
+            }
+            None => term
+                .parameters
+                .iter()
+                .zip(own)
+                .enumerate()
+                .map(|(i, (q, x))| {
+                    (
+                        q.name.clone(),
+                        Value { value: *x, std: Some(covariance[(at + i, at + i)].max(0.0).sqrt()) },
+                    )
+                })
+                .collect(),
+        };
+        if CoreExtension::with_id(term.effect).is_some() && term.export.is_some() {
+            let core = CoreExtension::with_id(term.effect).map(CoreExtension::names).unwrap_or_default();
+            let parameters = core
+                .iter()
+                .map(|name| ((*name).to_string(), exported.get(*name).map_or(0.0, |v| v.value)))
+                .collect();
+            extensions.push(Extension { id: term.effect.into(), parameters });
+        }
+        values.entry(term.effect).or_default().extend(exported);
+        at += count;
+    }
+    let block = problem.change(&fit.terms, &fit.p).block;
+    let mut extended = with_numbers(model, &numbers, block)?;
+    for extension in extensions {
+        extended.extensions.push(extension);
+        // What is out of the core's range stays out of the file.
+        if ModelFile::parse("model-extended.toml", &extended.to_toml()).is_err() {
+            extended.extensions.pop();
+        }
+    }
+    Ok(ExtendedContact { model: extended, values })
+}
+
+fn covariance(problem: &Problem<'_>, terms: &[usize], p: &[f64], r: &[f64]) -> DMatrix<f64> {
+    let j = problem.jacobian(terms, p, r);
+    let (mut h, _) = normal_equations(&j, &problem.weights(r), r);
+    for (i, q) in problem.parameters(terms).enumerate() {
+        h[(i, i)] += 1.0 / (q.sd * q.sd);
+    }
+    linear::factor(&h).inverse()
+}
+
+/// A model file with fitted numbers; `block` makes a model without one the series element.
+fn with_numbers(
+    model: &ModelFile,
+    numbers: &Numbers,
+    block: Option<(f64, f64)>,
+) -> Result<ModelFile, InputError> {
+    let theta = model.get("theta").unwrap_or(1.0);
+    let n = numbers;
+    let stiffness = if has_block(model) { "k_u_n_per_m" } else { "sigma0_n_per_m" };
+    let damping = if has_block(model) { "c_u_n_s_per_m" } else { "sigma1_n_s_per_m" };
+    let fitted = [
+        ("a0", n.a0 / theta),
+        ("a1", n.a1 / theta),
+        ("v0_m_s", n.v0_m_s),
+        ("delta", n.delta.clamp(0.25, 2.0)),
+        ("a2_s_per_m", n.a2_s_per_m),
+        (stiffness, n.stiffness_n_per_m),
+        (damping, n.damping_n_s_per_m),
+        ("mu_c", n.a0),
+        ("mu_s", n.a0 + n.a1),
+        ("c_n_per_m", n.stiffness_n_per_m),
+    ];
+    let mut values: Vec<(&str, f64)> = model
+        .parameters()
+        .map(|(name, value)| {
+            (name, fitted.iter().find(|(own, _)| *own == name).map_or(value, |(_, fitted)| *fitted))
+        })
+        .collect();
+    let kind = match block {
+        Some((k, c)) => {
+            values.extend([("k_u_n_per_m", k), ("c_u_n_s_per_m", c)]);
+            ModelKind::Series
+        }
+        None => model.kind,
+    };
+    ModelFile::new("model-extended.toml", kind, &values)
+}
+
+/// Parameters of the effects in a linear balance.
+pub fn linear_values(part: &Linear, place: usize) -> Values {
+    let solved = &part.solved[place];
+    let mut at = part.balance.base.len();
+    let mut out = Values::new();
+    for chosen in &solved.set {
+        let alternative = &part.alternatives[*chosen];
+        let entry = out.entry(alternative.effect).or_default();
+        for (i, q) in alternative.parameters.iter().enumerate() {
+            entry.insert(q.name.clone(), Value { value: solved.p[at + i], std: Some(solved.std[at + i]) });
+        }
+        for (name, value) in &alternative.constants {
+            entry.insert(name.clone(), Value { value: *value, std: None });
+        }
+        at += alternative.parameters.len();
+    }
+    out
+}
+
+fn line(name: &str, value: f64) -> String {
+    let value = number::text(value);
+    let point = if value.contains(['.', 'e']) { "" } else { ".0" };
+    format!("{name} = {value}{point}\n")
+}
+
+/// The file of a drive.
+pub fn drive_text(found: &Judgement) -> String {
+    let Some(part) = &found.drive else { return String::new() };
+    let place = found.place(Part::Drive).unwrap_or(0);
+    let names = if found.linear_stage {
+        ["mass_kg", "coulomb_n", "viscous_n_s_per_m"]
+    } else {
+        ["inertia_kg_m2", "coulomb_nm", "viscous_nm_s_per_rad"]
+    };
+    let mut text = "kind = \"drive\"\n\n[parameters]\n".to_string();
+    for (name, value) in names.iter().zip(&part.solved[place].p) {
+        text += &line(name, *value);
+    }
+    for (id, values) in linear_values(part, place) {
+        text += &format!("\n[[extension]]\nid = \"{id}\"\n");
+        values.iter().for_each(|(name, v)| text += &line(name, v.value));
+    }
+    text
+}
+
+/// What was found outside the contact, as comments of its file.
+pub fn remarks(found: &Judgement) -> String {
+    let mut text = String::new();
+    for (part, linear) in [(Part::Drive, &found.drive), (Part::Pressure, &found.press)] {
+        let (Some(linear), Some(place)) = (linear, found.place(part)) else { continue };
+        for (id, values) in linear_values(linear, place) {
+            text += &format!(
+                "\n# {id} was found in the balance of the {}; the observer on the chip has no law for it:\n",
+                part.name()
+            );
+            values.iter().for_each(|(name, v)| text += &format!("# {}", line(name, v.value)));
+        }
+    }
+    text
+}

@@ -1,0 +1,329 @@
+//! Errors of baseline and extended model, on the logs fitted and on those held out.
+//!
+//! Nothing is fitted to a held-out log: its columns are made with the training logs' scales and shapes, and multiplied with
+//! the training logs' values. What belongs to one log alone, as the phase of a pattern under an incremental encoder, is
+//! not known for another one and left out.
+
+use super::balance::{Alternative, Balance};
+use super::contact::log::ContactLog;
+use super::contact::problem::Problem;
+use super::drive::{self, DriveLog, DriveScales};
+use super::effects::{DriveView, LIBRARY, PressView};
+use super::judge::{self, ContactPart, Judgement, Linear, Part};
+use super::press::{self, PressLog, PressScales};
+use crate::files::log::Log;
+use crate::files::rig_file::RigFile;
+use crate::input_error::InputError;
+
+/// Blocks of the standard error of a gain, s: longer than anything that correlates residuals.
+const BLOCK_S: f64 = 0.5;
+
+/// Errors of the contact are taken where the noise of motion and load between samples is below so many deviations of the
+/// sensor's: bristles at rest and the instants at which they break away show no law.
+const WELL_KNOWN: f64 = 10.0;
+
+/// Errors in one log.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LogErrors {
+    /// The log's name.
+    pub log: String,
+    /// RMS error over RMS signal, baseline.
+    pub baseline_nrmse: f64,
+    /// The same, extended.
+    pub extended_nrmse: f64,
+    /// The same of what noise alone leaves.
+    pub noise_floor_nrmse: f64,
+    /// 1 − extended/baseline.
+    pub gain: f64,
+    /// Its standard error, from blocks of half a second.
+    pub gain_std: f64,
+}
+
+/// Errors of a part over logs.
+#[derive(Debug, Clone, Default)]
+pub struct Errors {
+    /// Each log.
+    pub logs: Vec<LogErrors>,
+    sums: [f64; 4],
+}
+
+impl Errors {
+    /// nrmse of the baseline, of the extended model, of noise alone, over all logs together.
+    pub fn nrmse(&self) -> Option<[f64; 3]> {
+        let [signal, base, extended, noise] = self.sums;
+        (signal > 0.0).then(|| [base, extended, noise].map(|s| (s / signal).sqrt()))
+    }
+
+    fn add(&mut self, name: &str, points: &[Point], step_s: f64) {
+        let sum = |of: fn(&Point) -> f64| points.iter().map(of).sum::<f64>();
+        let sums = [
+            sum(|p| p.signal * p.signal),
+            sum(|p| p.base * p.base),
+            sum(|p| p.extended * p.extended),
+            sum(|p| p.noise * p.noise),
+        ];
+        self.sums.iter_mut().zip(sums).for_each(|(all, own)| *all += own);
+        let [signal, base, extended, noise] = sums;
+        if signal <= 0.0 || base <= 0.0 {
+            return;
+        }
+        let gain = |base: f64, extended: f64| 1.0 - (extended / base.max(1e-300)).sqrt();
+        // Jackknife over blocks.
+        let block = (BLOCK_S / step_s).round().max(1.0) as usize;
+        let without: Vec<f64> = points
+            .chunks(block)
+            .map(|chunk| {
+                let b: f64 = chunk.iter().map(|p| p.base * p.base).sum();
+                let e: f64 = chunk.iter().map(|p| p.extended * p.extended).sum();
+                gain(base - b, extended - e)
+            })
+            .collect();
+        let n = without.len() as f64;
+        let mean = without.iter().sum::<f64>() / n;
+        let variance = (n - 1.0) / n * without.iter().map(|g| (g - mean).powi(2)).sum::<f64>();
+        self.logs.push(LogErrors {
+            log: name.into(),
+            baseline_nrmse: (base / signal).sqrt(),
+            extended_nrmse: (extended / signal).sqrt(),
+            noise_floor_nrmse: (noise / signal).sqrt(),
+            gain: gain(base, extended),
+            gain_std: variance.sqrt(),
+        });
+    }
+}
+
+struct Point {
+    signal: f64,
+    base: f64,
+    extended: f64,
+    noise: f64,
+}
+
+/// Errors of each part on these logs.
+///
+/// # Errors
+/// Where a log lacks a column.
+pub fn errors(
+    found: &Judgement,
+    logs: &[Log],
+    rig: &RigFile,
+    training: bool,
+) -> Result<Vec<(Part, Errors)>, InputError> {
+    let mut out = Vec::new();
+    if let Some(contact) = &found.contact {
+        let place = found.place(Part::Friction).unwrap_or(0);
+        let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+        out.push((Part::Friction, contact_errors(contact, place, &prepared, training)));
+        let drives: Option<Vec<DriveLog>> =
+            prepared.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
+        if let (Some(drive), Some(drives)) = (&found.drive, drives) {
+            out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), training)));
+        }
+        let presses: Option<Vec<PressLog>> = prepared.iter().map(PressLog::new).collect();
+        if let (Some(press), Some(presses)) = (&found.press, presses) {
+            let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
+            out.push((Part::Pressure, press_errors(found, press, &presses, &names, rig, training)));
+        }
+    } else if let Some(drive) = &found.drive {
+        let drives = logs.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
+        out.push((Part::Drive, drive_errors(found, drive, &drives, None, training)));
+    }
+    Ok(out)
+}
+
+fn contact_errors(contact: &ContactPart, place: usize, logs: &[ContactLog], training: bool) -> Errors {
+    let terms = judge::contact_terms(logs, &contact.scales, training, contact.logs.len(), contact.block);
+    // The forms stand in the same order, but that a held-out log may offer some that the training logs did not.
+    let find = |term: usize| {
+        let own = &contact.terms[term];
+        terms.iter().position(|t| t.effect == own.effect && t.form == own.form)
+    };
+    let fit = contact.fit(place);
+    let Some(own_terms) = fit.terms.iter().map(|t| find(*t)).collect::<Option<Vec<usize>>>() else {
+        return Errors::default();
+    };
+    let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map_or(fit, |r| &r.fit);
+    let problem = Problem::new(logs, &contact.baseline, &terms);
+    let base = problem.predict(&none.terms, &none.p).shown_nm;
+    let extended = problem.predict(&own_terms, &fit.p).shown_nm;
+    let mut errors = Errors::default();
+    let mut at = 0;
+    for log in logs {
+        let points: Vec<Point> = (0..log.len())
+            .filter(|i| log.usable[*i] && problem.noise.named(at + *i) < WELL_KNOWN * log.friction_noise_nm)
+            .map(|i| {
+                let y = log.friction_nm[i];
+                Point {
+                    signal: y,
+                    base: y - base[at + i],
+                    extended: y - extended[at + i],
+                    noise: problem.noise.named(at + i),
+                }
+            })
+            .collect();
+        errors.add(&log.source, &points, log.grid.step_s);
+        at += log.len();
+    }
+    errors
+}
+
+/// Values of a training set's columns in another balance; those of one log alone are left out.
+fn extended_residual(
+    part: &Linear,
+    place: usize,
+    balance: &Balance,
+    fixed: &[Alternative],
+) -> (Vec<f64>, Vec<f64>) {
+    let base_values = |solved: &super::balance::Solved| solved.p[..balance.base.len()].to_vec();
+    let take = |values: &[f64], response: Vec<f64>, columns: Vec<&Vec<f64>>| {
+        let mut r = response;
+        for (c, p) in columns.into_iter().zip(values) {
+            r.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
+        }
+        r
+    };
+    let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(&part.solved[place]);
+    let base =
+        take(&base_values(none), balance.response.clone(), balance.base.iter().map(|b| &b.1).collect());
+    let solved = &part.solved[place];
+    let mut response = balance.response.clone();
+    let mut columns: Vec<&Vec<f64>> = balance.base.iter().map(|b| &b.1).collect();
+    let mut values = base_values(solved);
+    let mut at = balance.base.len();
+    for chosen in &solved.set {
+        let own = &part.alternatives[*chosen];
+        let count = own.parameters.len();
+        let other = fixed.iter().find(|a| {
+            a.effect == own.effect
+                && a.parameters.len() == count
+                && a.parameters.iter().zip(&own.parameters).all(|(a, b)| a.name == b.name)
+        });
+        if let Some(other) = other {
+            if let Some(added) = &other.response {
+                response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
+            }
+            for (place, column) in &other.replaces {
+                columns[*place] = column;
+            }
+            let one_log = other.parameters.iter().any(|p| p.name.contains("_log"));
+            if !one_log {
+                columns.extend(other.columns.iter());
+                values.extend_from_slice(&solved.p[at..at + count]);
+            }
+        }
+        at += count;
+    }
+    (base, take(&values, response, columns))
+}
+
+fn linear_errors(
+    names: &[String],
+    balance: &Balance,
+    base: &[f64],
+    extended: &[f64],
+    times_s: f64,
+) -> Errors {
+    let mut errors = Errors::default();
+    for (rows, name) in balance.rows_of_logs().iter().zip(names) {
+        let points: Vec<Point> = rows
+            .iter()
+            .map(|&i| Point {
+                signal: balance.response[i],
+                base: base[i],
+                extended: extended[i],
+                noise: balance.first_deviation[i],
+            })
+            .collect();
+        errors.add(name, &points, times_s);
+    }
+    errors
+}
+
+fn drive_errors(
+    found: &Judgement,
+    part: &Linear,
+    logs: &[DriveLog],
+    rig: Option<&RigFile>,
+    training: bool,
+) -> Errors {
+    let place = found.place(Part::Drive).unwrap_or(0);
+    let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
+    if training {
+        let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(&part.solved[place]);
+        return linear_errors(
+            &names,
+            &part.balance,
+            &none.residual,
+            &part.solved[place].residual,
+            part.balance.row_step_s,
+        );
+    }
+    let nothing = drive::DrivePrior { inertia: None, coulomb: None, viscous: None };
+    let prior = rig.map_or(nothing, judge::drive_prior);
+    let scales = DriveScales::new(logs);
+    let balance = drive::balance(logs, &prior, &scales);
+    let solved = &part.solved[place];
+    let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(solved);
+    let residual: Vec<f64> = {
+        let mut r = balance.response.clone();
+        for ((_, c), p) in balance.base.iter().zip(&none.p) {
+            r.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
+        }
+        r
+    };
+    let mut fixed = Vec::new();
+    for chosen in &solved.set {
+        let own = &part.alternatives[*chosen];
+        let view = DriveView {
+            logs,
+            scales: part.drive_scales.as_ref().unwrap_or(&scales),
+            balance: &balance,
+            residual: &residual,
+            rotary: !found.linear_stage,
+            inertia: none.p[drive::INERTIA],
+            fixed: Some(&own.constants),
+        };
+        fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.drive(&view)));
+    }
+    let (base, extended) = extended_residual(part, place, &balance, &fixed);
+    linear_errors(&names, &balance, &base, &extended, balance.row_step_s)
+}
+
+fn press_errors(
+    found: &Judgement,
+    part: &Linear,
+    logs: &[PressLog],
+    names: &[String],
+    rig: &RigFile,
+    training: bool,
+) -> Errors {
+    let place = found.place(Part::Pressure).unwrap_or(0);
+    if training {
+        let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(&part.solved[place]);
+        return linear_errors(
+            names,
+            &part.balance,
+            &none.residual,
+            &part.solved[place].residual,
+            part.balance.row_step_s,
+        );
+    }
+    let own_scales = PressScales::new(logs);
+    let scales = part.press_scales.as_ref().unwrap_or(&own_scales);
+    let balance = press::balance(logs, rig, scales);
+    let solved = &part.solved[place];
+    let mut fixed = Vec::new();
+    for chosen in &solved.set {
+        let own = &part.alternatives[*chosen];
+        let view = PressView {
+            logs,
+            scales,
+            balance: &balance,
+            residual: &balance.response,
+            fixed: Some(&own.constants),
+        };
+        fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.press(&view)));
+    }
+    let (base, extended) = extended_residual(part, place, &balance, &fixed);
+    linear_errors(names, &balance, &base, &extended, balance.row_step_s)
+}

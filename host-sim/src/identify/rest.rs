@@ -1,0 +1,153 @@
+//! What is left after the best hypothesis: how large, how far beyond noise, what it follows.
+
+use super::balance::Balance;
+use super::contact::noise::MODEL_FORM;
+use super::judge::ContactPart;
+
+/// Blocks over which residuals are averaged, s: what is left is structured where it lasts.
+const BLOCK_S: f64 = 0.05;
+/// A rest is beyond the form of a model where it is this many times [`MODEL_FORM`] of the signal: what a wrong law leaves.
+const BEYOND_FORM: f64 = 3.0;
+/// The rest is most of the residual where it holds this share of the baseline's mean square.
+const MOST: f64 = 0.5;
+
+/// What is left of a balance.
+#[derive(Debug, Clone, Default)]
+pub struct Rest {
+    /// RMS of the structured rest over that of the signal.
+    pub size: f64,
+    /// Mean square of the structured rest over the baseline's.
+    pub share: f64,
+    /// Mean square of the structured rest over that of the noise.
+    pub times_noise: f64,
+    /// What it goes along with: quantity and share of its variance.
+    pub follows: Vec<(String, f64)>,
+}
+
+impl Rest {
+    /// Probability that it is something that the library does not have.
+    pub fn unknown(&self) -> f64 {
+        let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
+        logistic(8.0 * (self.size / (BEYOND_FORM * MODEL_FORM)).max(1e-9).ln())
+            * logistic((self.share - MOST) / 0.05)
+    }
+}
+
+/// Mean squares of means over blocks, less what noise leaves of them.
+fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> (f64, f64) {
+    let (mut sum, mut left, mut count) = (0.0, 0.0, 0.0f64);
+    for chunk in rows.chunks(block) {
+        if chunk.len() * 2 < block {
+            continue;
+        }
+        let n = chunk.len() as f64;
+        let mean = chunk.iter().map(|i| residual[*i]).sum::<f64>() / n;
+        sum += mean * mean;
+        left += chunk.iter().map(|i| noise[*i].powi(2)).sum::<f64>() / (n * n);
+        count += 1.0;
+    }
+    let count = count.max(1.0);
+    ((sum / count - left / count).max(0.0), left / count)
+}
+
+/// Of the contact's balance.
+pub fn of_contact(contact: &ContactPart, place: usize) -> Rest {
+    let problem = contact.problem();
+    let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit);
+    let fit = contact.fit(place);
+    let limit = 10.0 * contact.logs.iter().map(|log| log.friction_noise_nm).fold(0.0, f64::max);
+    let deviation = &problem.noise.deviation;
+    let rows: Vec<usize> =
+        (0..deviation.len()).filter(|i| deviation[*i] < limit && fit.r[*i] != 0.0).collect();
+    let in_units = |r: &[f64]| r.iter().zip(deviation).map(|(r, s)| r * s).collect::<Vec<f64>>();
+    let noise: Vec<f64> =
+        contact.logs.iter().flat_map(|log| vec![log.friction_noise_nm; log.len()]).collect();
+    let signal = (problem.measured().map(|y| y * y).sum::<f64>() / deviation.len().max(1) as f64).sqrt();
+    let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
+    let block = (BLOCK_S / step_s).round().max(1.0) as usize;
+    let residual = in_units(&fit.r);
+    let (rest, left) = structured(&residual, &noise, &rows, block);
+    let before = none.map_or(rest, |none| structured(&in_units(&none.r), &noise, &rows, block).0);
+    let quantities = contact_quantities(contact);
+    Rest {
+        size: (rest.sqrt()) / signal.max(1e-12),
+        share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
+        times_noise: rest / left.max(1e-300),
+        follows: follows(&residual, &rows, block, &quantities),
+    }
+}
+
+fn contact_quantities(contact: &ContactPart) -> Vec<(String, Vec<f64>)> {
+    let gather = |of: &dyn Fn(&super::contact::log::ContactLog, usize) -> f64| -> Vec<f64> {
+        contact
+            .logs
+            .iter()
+            .flat_map(|log| (0..log.len()).map(move |i| (log, i)))
+            .map(|(log, i)| of(log, i))
+            .collect()
+    };
+    vec![
+        ("time".into(), gather(&|log, i| log.grid.time_s[i])),
+        ("normal force".into(), gather(&|log, i| log.load_n[i])),
+        ("sliding speed".into(), gather(&|log, i| log.root_speed_m_s[i].abs().max(1e-6).ln())),
+        ("direction".into(), gather(&|log, i| log.root_speed_m_s[i].signum())),
+        ("disc angle".into(), gather(&|log, i| log.angle_rad[i].rem_euclid(std::f64::consts::TAU))),
+        ("friction torque".into(), gather(&|log, i| log.smooth_nm[i])),
+    ]
+}
+
+/// Share of the blocks' variance that lies between bins of a quantity, for those that hold most, less what chance gives.
+fn follows(
+    residual: &[f64],
+    rows: &[usize],
+    block: usize,
+    quantities: &[(String, Vec<f64>)],
+) -> Vec<(String, f64)> {
+    const BINS: usize = 24;
+    let mut out = Vec::new();
+    for (name, values) in quantities {
+        let mut points: Vec<(f64, f64)> = rows
+            .chunks(block)
+            .filter(|chunk| chunk.len() * 2 >= block)
+            .map(|chunk| {
+                let n = chunk.len() as f64;
+                (values[chunk[chunk.len() / 2]], chunk.iter().map(|i| residual[*i]).sum::<f64>() / n)
+            })
+            .collect();
+        if points.len() < 4 * BINS {
+            continue;
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mean = points.iter().map(|p| p.1).sum::<f64>() / points.len() as f64;
+        let all: f64 = points.iter().map(|p| (p.1 - mean).powi(2)).sum();
+        let between: f64 = points
+            .chunks(points.len().div_ceil(BINS))
+            .map(|bin| {
+                let n = bin.len() as f64;
+                n * (bin.iter().map(|p| p.1).sum::<f64>() / n - mean).powi(2)
+            })
+            .sum();
+        let chance = BINS as f64 / points.len() as f64;
+        let share = if all > 0.0 { (between / all - chance).max(0.0) } else { 0.0 };
+        if share > 0.1 {
+            out.push((name.clone(), share));
+        }
+    }
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out.truncate(3);
+    out
+}
+
+/// Of a linear balance.
+pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> Rest {
+    let block = (BLOCK_S / balance.row_step_s).round().max(1.0) as usize;
+    let (rest, left) = structured(residual, &balance.first_deviation, &balance.used, block);
+    let before = none.map_or(rest, |none| structured(none, &balance.first_deviation, &balance.used, block).0);
+    let time: Vec<f64> = (0..residual.len()).map(|i| i as f64).collect();
+    Rest {
+        size: rest.sqrt() / balance.rms(&balance.response).max(1e-12),
+        share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
+        times_noise: rest / left.max(1e-300),
+        follows: follows(residual, &balance.used, block, &[("time".into(), time)]),
+    }
+}

@@ -1,0 +1,425 @@
+//! `diagnosis.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::contact::noise::MODEL_FORM;
+use super::effects::LIBRARY;
+use super::extended_model::Values;
+use super::holdout::{Errors, LogErrors};
+use super::judge::{Hypothesis, Judgement, Part};
+use crate::files::effect_id::subsystem_of;
+
+/// Hypotheses written out; the others are summed up.
+const WRITTEN: usize = 40;
+/// Rivals that hold this share of the answer's probability are not told apart from it.
+const OPEN_SHARE: f64 = 0.2;
+
+/// A fitted number.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation; null where these logs do not determine it.
+    pub std: Option<f64>,
+}
+
+/// A named cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct Cause {
+    pub id: String,
+    pub subsystem: &'static str,
+    pub probability: f64,
+    pub parameters: BTreeMap<String, Parameter>,
+    pub evidence: Vec<String>,
+}
+
+/// A rejected rival.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct Rejected {
+    pub id: String,
+    pub probability: f64,
+    pub why: String,
+}
+
+/// Errors of the baseline.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct BaselineErrors {
+    pub kind: String,
+    pub train_nrmse: Option<f64>,
+    pub holdout_nrmse: Option<f64>,
+}
+
+/// Errors of the extended model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct ExtendedErrors {
+    pub holdout_nrmse: Option<f64>,
+    pub gain: Option<f64>,
+    pub noise_floor_nrmse: Option<f64>,
+}
+
+/// What is left after the best hypothesis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct Remaining {
+    pub share_of_baseline: f64,
+    pub times_noise: f64,
+    pub follows: Vec<String>,
+    pub balance: &'static str,
+    pub sentence: String,
+}
+
+/// One subsystem.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct Subsystem {
+    pub causes: Vec<String>,
+    pub baseline: BaselineErrors,
+    pub extended: ExtendedErrors,
+    pub remaining: Remaining,
+    /// Each held-out log.
+    pub holdout: Vec<LogErrors>,
+}
+
+/// The file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the format's names")]
+pub struct Diagnosis {
+    pub verdict: &'static str,
+    /// The verdict in words.
+    pub sentence: String,
+    pub baseline: BaselineErrors,
+    pub causes: Vec<Cause>,
+    pub rejected: Vec<Rejected>,
+    pub indistinguishable: Vec<Vec<String>>,
+    pub extended: ExtendedErrors,
+    pub posterior: BTreeMap<String, f64>,
+    pub remaining: Remaining,
+    pub next_experiment: String,
+    pub subsystems: BTreeMap<&'static str, Subsystem>,
+    /// What was assumed about the input.
+    pub notes: Vec<String>,
+    /// Time that the diagnosis took.
+    pub wall_s: f64,
+}
+
+/// What the diagnosis is put together from.
+pub struct Found<'a> {
+    /// The search.
+    pub judgement: &'a Judgement,
+    /// Kind of the baseline.
+    pub kind: &'a str,
+    /// Parameters of the effects.
+    pub values: &'a Values,
+    /// Errors on the training logs and on those held out.
+    pub train: &'a [(Part, Errors)],
+    /// As [`Self::train`].
+    pub holdout: &'a [(Part, Errors)],
+}
+
+fn set_name(effects: &[&str]) -> String {
+    if effects.is_empty() { "none".into() } else { effects.join("+") }
+}
+
+fn percent(x: f64) -> String {
+    format!("{:.2} %", 100.0 * x)
+}
+
+impl Diagnosis {
+    /// Puts it together.
+    pub fn new(found: &Found<'_>, wall_s: f64) -> Self {
+        let judged = found.judgement;
+        let verdict = judged.verdict();
+        let best = judged.best();
+        let marginal = |id: &str| -> f64 {
+            let with = judged.hypotheses.iter().filter(|h| h.effects.contains(&id));
+            (1.0 - judged.unknown) * with.map(|h| h.probability).sum::<f64>()
+        };
+        let subsystems: BTreeMap<&'static str, Subsystem> =
+            judged.rests.iter().map(|(part, _)| (part.name(), subsystem(found, *part))).collect();
+        let causes: Vec<Cause> = if verdict == "named" {
+            let mut causes: Vec<Cause> = best
+                .effects
+                .iter()
+                .zip(&best.sizes)
+                .map(|(id, size)| cause(found, id, *size, marginal(id)))
+                .collect();
+            let size = |id: &str| best.effects.iter().position(|e| *e == id).map_or(0.0, |at| best.sizes[at]);
+            causes.sort_by(|a, b| size(&b.id).total_cmp(&size(&a.id)));
+            causes
+        } else {
+            Vec::new()
+        };
+        let main = main_part(judged, &causes);
+        let shown = subsystems.get(main.name());
+        let empty = || BaselineErrors { kind: found.kind.into(), train_nrmse: None, holdout_nrmse: None };
+        let baseline = shown.map_or_else(empty, |s| s.baseline.clone());
+        let nothing = ExtendedErrors { holdout_nrmse: None, gain: None, noise_floor_nrmse: None };
+        let extended = shown.map_or(nothing, |s| s.extended.clone());
+        let remaining = remaining(judged, main);
+        let groups = groups(judged, verdict);
+        let sentence = sentence(verdict, &causes, &baseline, &extended, &remaining);
+        Self {
+            verdict,
+            sentence,
+            baseline,
+            rejected: rejected(judged, verdict, &marginal),
+            next_experiment: next(judged, verdict, &groups),
+            indistinguishable: groups,
+            causes,
+            extended,
+            posterior: posterior(judged),
+            remaining,
+            subsystems,
+            notes: judged.notes.clone(),
+            wall_s,
+        }
+    }
+}
+
+fn posterior(judged: &Judgement) -> BTreeMap<String, f64> {
+    let known = 1.0 - judged.unknown;
+    let mut out: BTreeMap<String, f64> = BTreeMap::new();
+    out.insert("unknown".into(), judged.unknown);
+    out.insert("none".into(), 0.0);
+    let mut others = 0.0;
+    for (i, h) in judged.hypotheses.iter().enumerate() {
+        if i < WRITTEN || h.effects.is_empty() {
+            *out.entry(set_name(&h.effects)).or_insert(0.0) += known * h.probability;
+        } else {
+            others += known * h.probability;
+        }
+    }
+    if others > 0.0 {
+        out.insert("others".into(), others);
+    }
+    out
+}
+
+fn subsystem(found: &Found<'_>, part: Part) -> Subsystem {
+    let of = |errors: &[(Part, Errors)]| errors.iter().find(|(p, _)| *p == part).and_then(|(_, e)| e.nrmse());
+    let (train, holdout) = (of(found.train), of(found.holdout));
+    let logs = found.holdout.iter().find(|(p, _)| *p == part).map_or(Vec::new(), |(_, e)| e.logs.clone());
+    let judged = found.judgement;
+    let kind = if part == Part::Friction { found.kind } else { part.name() };
+    Subsystem {
+        causes: acting(judged, part).into_iter().map(String::from).collect(),
+        baseline: BaselineErrors {
+            kind: kind.into(),
+            train_nrmse: train.map(|e| e[0]),
+            holdout_nrmse: holdout.map(|e| e[0]),
+        },
+        extended: ExtendedErrors {
+            holdout_nrmse: holdout.map(|e| e[1]),
+            gain: holdout.filter(|e| e[0] > 0.0).map(|e| 1.0 - e[1] / e[0]),
+            noise_floor_nrmse: holdout.map(|e| e[2]),
+        },
+        remaining: remaining(judged, part),
+        holdout: logs,
+    }
+}
+
+/// Effects of the answer that act in a part's balance.
+fn acting(judged: &Judgement, part: Part) -> Vec<&'static str> {
+    let Some(place) = judged.place(part) else { return Vec::new() };
+    match part {
+        Part::Friction => judged.contact.as_ref().map_or(Vec::new(), |contact| {
+            contact.fit(place).terms.iter().map(|t| contact.terms[*t].effect).collect()
+        }),
+        Part::Drive | Part::Pressure => {
+            let linear = if part == Part::Drive { &judged.drive } else { &judged.press };
+            let effects = |l: &super::judge::Linear| {
+                l.solved[place].set.iter().map(|a| l.alternatives[*a].effect).collect()
+            };
+            linear.as_ref().map_or(Vec::new(), effects)
+        }
+    }
+}
+
+fn main_part(judged: &Judgement, causes: &[Cause]) -> Part {
+    let first = causes.first();
+    let with_cause = first.and_then(|cause| {
+        let parts = judged.rests.iter().map(|(part, _)| *part);
+        parts.into_iter().find(|part| acting(judged, *part).contains(&cause.id.as_str()))
+    });
+    let largest = || {
+        let unknown = judged.rests.iter().max_by(|a, b| a.1.unknown().total_cmp(&b.1.unknown()));
+        unknown.filter(|(_, rest)| rest.unknown() > 0.5).map(|(part, _)| *part)
+    };
+    let first_part = judged.rests.first().map_or(Part::Friction, |(part, _)| *part);
+    with_cause.or_else(largest).unwrap_or(first_part)
+}
+
+fn remaining(judged: &Judgement, part: Part) -> Remaining {
+    let rest =
+        judged.rests.iter().find(|(p, _)| *p == part).map(|(_, rest)| rest.clone()).unwrap_or_default();
+    let follows: Vec<String> = rest.follows.iter().map(|(name, _)| name.clone()).collect();
+    let along = if rest.follows.is_empty() {
+        "nothing that was looked at".to_string()
+    } else {
+        rest.follows
+            .iter()
+            .map(|(name, share)| format!("{name} ({:.0} % of it)", 100.0 * share))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let sentence = format!(
+        "In the balance of the {} {} of the signal is left beyond noise ({:.1} times it, {:.0} % of what the baseline leaves); it follows {along}.",
+        part.name(),
+        percent(rest.size),
+        rest.times_noise,
+        100.0 * rest.share
+    );
+    Remaining {
+        share_of_baseline: rest.share,
+        times_noise: rest.times_noise,
+        follows,
+        balance: part.name(),
+        sentence,
+    }
+}
+
+fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Cause {
+    let judged = found.judgement;
+    let about = LIBRARY.iter().map(|e| e.about()).find(|a| a.id == id);
+    let mut evidence = Vec::new();
+    if let Some(about) = about {
+        evidence.push(format!(
+            "{}: it changes the prediction by {} of the signal",
+            about.meaning,
+            percent(size)
+        ));
+    }
+    let without = judged.hypotheses.iter().find(|h| !h.effects.contains(&id));
+    if let Some(without) = without {
+        evidence.push(format!(
+            "the best explanation without it ({}) has a log evidence that is {:.0} lower",
+            set_name(&without.effects),
+            (judged.best().log_weight - without.log_weight) / super::judge::EVIDENCE_SHARE
+        ));
+    }
+    for (part, errors) in found.holdout {
+        if let (true, Some([base, extended, noise])) = (acting(judged, *part).contains(&id), errors.nrmse()) {
+            evidence.push(format!(
+                "on the held-out logs the error of the {} falls from {} to {}; noise alone leaves {}",
+                part.name(),
+                percent(base),
+                percent(extended),
+                percent(noise)
+            ));
+        }
+    }
+    let parameters = found.values.get(id).map_or(BTreeMap::new(), |values| {
+        values.iter().map(|(name, v)| (name.clone(), Parameter { value: v.value, std: v.std })).collect()
+    });
+    let subsystem = subsystem_of(id).map_or("friction", |s| s.name());
+    Cause { id: id.into(), subsystem, probability, parameters, evidence }
+}
+
+fn rejected(judged: &Judgement, verdict: &str, marginal: &dyn Fn(&str) -> f64) -> Vec<Rejected> {
+    let best = judged.best();
+    let named = |id: &str| verdict == "named" && best.effects.contains(&id);
+    let mut out: Vec<Rejected> = Vec::new();
+    for effect in LIBRARY.iter().map(|e| e.id()).filter(|id| !named(id)) {
+        let with = judged.hypotheses.iter().find(|h| h.effects.contains(&effect));
+        let small = judged.too_small.iter().find(|(id, _)| *id == effect);
+        let why = match (with, small) {
+            (_, Some((_, size))) => format!(
+                "it would change the prediction by {} of the signal, less than the form of the model is known to ({})",
+                percent(*size),
+                percent(MODEL_FORM)
+            ),
+            (Some(h), None) if h.effects == best.effects => {
+                "what is left is larger than what it explains".into()
+            }
+            (Some(h), None) => format!(
+                "the best explanation with it ({}) has a log evidence that is {:.0} lower",
+                set_name(&h.effects),
+                (best.log_weight - h.log_weight) / super::judge::EVIDENCE_SHARE
+            ),
+            (None, None) => continue,
+        };
+        out.push(Rejected { id: effect.into(), probability: marginal(effect), why });
+    }
+    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    out
+}
+
+/// Effects that stand in for each other: sets that differ from the answer in one effect and are nearly as probable.
+fn groups(judged: &Judgement, verdict: &str) -> Vec<Vec<String>> {
+    if verdict != "named" {
+        return Vec::new();
+    }
+    let best = judged.best();
+    let near = |h: &&Hypothesis| {
+        h.probability > OPEN_SHARE * best.probability && h.effects.len() == best.effects.len()
+    };
+    let mut out = Vec::new();
+    for other in judged.hypotheses.iter().skip(1).filter(near) {
+        let only = |a: &[&'static str], b: &[&'static str]| -> Vec<&'static str> {
+            a.iter().copied().filter(|e| !b.contains(e)).collect()
+        };
+        let (mine, theirs) = (only(&best.effects, &other.effects), only(&other.effects, &best.effects));
+        if let ([a], [b]) = (mine.as_slice(), theirs.as_slice()) {
+            out.push(vec![(*a).to_string(), (*b).to_string()]);
+        }
+    }
+    out
+}
+
+fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>]) -> String {
+    let about = |id: &str| LIBRARY.iter().map(|e| e.about()).find(|a| a.id == id);
+    if let Some(pair) = groups.first() {
+        let texts: Vec<&str> = pair.iter().filter_map(|id| about(id).map(|a| a.experiment)).collect();
+        return format!("To tell {} apart: {}.", pair.join(" and "), texts.join("; or "));
+    }
+    match verdict {
+        "named" => {
+            let id = judged.best().effects.first().copied().unwrap_or_default();
+            about(id).map_or(String::new(), |a| format!("To confirm {id}: {}.", a.experiment))
+        }
+        "unknown" => {
+            let follows =
+                judged.rests.iter().flat_map(|(_, rest)| rest.follows.first()).map(|f| f.0.as_str()).next();
+            match follows {
+                Some(what) => format!("To see what the rest is: vary the {what} alone, everything else held."),
+                None => "To see what the rest is: repeat the same run twice; what does not repeat is no property of the rig.".into(),
+            }
+        }
+        _ => "Nothing is open: hold out a run with larger speeds and loads than these.".into(),
+    }
+}
+
+fn sentence(
+    verdict: &str,
+    causes: &[Cause],
+    base: &BaselineErrors,
+    extended: &ExtendedErrors,
+    rest: &Remaining,
+) -> String {
+    let text = |x: Option<f64>| x.map_or("unknown".to_string(), percent);
+    match verdict {
+        "named" => {
+            let names: Vec<String> =
+                causes.iter().map(|c| format!("{} ({:.1} %)", c.id, 100.0 * c.probability)).collect();
+            format!(
+                "The cause is {}: with it the error on the held-out logs falls from {} to {}; noise alone leaves {}.",
+                names.join(" and "),
+                text(base.holdout_nrmse),
+                text(extended.holdout_nrmse),
+                text(extended.noise_floor_nrmse)
+            )
+        }
+        "unknown" => format!("Something is wrong that nothing in the library explains. {}", rest.sentence),
+        _ => format!(
+            "Nothing is wrong beyond noise: the baseline's error on the held-out logs is {}, noise alone leaves {}.",
+            text(base.holdout_nrmse),
+            text(extended.noise_floor_nrmse)
+        ),
+    }
+}
