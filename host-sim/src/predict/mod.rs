@@ -15,6 +15,7 @@ mod extended;
 mod friction;
 mod inputs;
 mod normal_force;
+pub mod observed_slip;
 mod second_order;
 
 pub use bridge::BridgeModel;

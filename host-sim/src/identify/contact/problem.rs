@@ -47,6 +47,8 @@ pub enum Role {
     Stiffness,
     /// Its damping.
     Damping,
+    /// Factor on all friction: of A0 and A1, after them.
+    Factor,
     /// How late the channel is, ms; not a logarithm.
     Late,
 }
@@ -94,9 +96,8 @@ impl Baseline {
     /// Numbers for fitted values.
     pub fn numbers(&self, p: &[f64]) -> Numbers {
         let mut numbers = self.numbers;
-        for (base, &value) in self.free.iter().zip(p) {
-            let q = &base.parameter;
-            let value = q.mean + BOUND * q.sd * ((value - q.mean) / (BOUND * q.sd)).tanh();
+        for (at, base) in self.free.iter().enumerate() {
+            let value = self.bounded(p, at);
             let slot = match base.role {
                 Role::A0 => &mut numbers.a0,
                 Role::A1 => &mut numbers.a1,
@@ -105,6 +106,11 @@ impl Baseline {
                 Role::A2 => &mut numbers.a2_s_per_m,
                 Role::Stiffness => &mut numbers.stiffness_n_per_m,
                 Role::Damping => &mut numbers.damping_n_s_per_m,
+                Role::Factor => {
+                    numbers.a0 *= value.exp();
+                    numbers.a1 *= value.exp();
+                    continue;
+                }
                 Role::Late => {
                     numbers.late_ms = value;
                     continue;
@@ -113,6 +119,12 @@ impl Baseline {
             *slot = value.exp();
         }
         numbers
+    }
+
+    /// A fitted value within its bounds.
+    pub fn bounded(&self, p: &[f64], at: usize) -> f64 {
+        let q = &self.free[at].parameter;
+        q.mean + BOUND * q.sd * ((p[at] - q.mean) / (BOUND * q.sd)).tanh()
     }
 }
 

@@ -1,0 +1,233 @@
+//! `rig fit` for contact logs: the contact's likelihood with no effect beside the baseline.
+//!
+//! The friction law is evaluated at the slip that is observed from the measured force
+//! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
+//! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it;
+//! then the noise's sources are fitted to what is left, and the parameters again.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::contact::log::ContactLog;
+use super::contact::problem::{Baseline, Fit, Problem, Role};
+use super::fit_interval::covariance;
+use super::fit_parameters::{baseline_of, log_derivatives, values};
+use crate::files::log::Log;
+use crate::files::model_file::{Interval, ModelFile};
+use crate::files::rig_file::RigFile;
+use crate::fit::covariance::INTERVAL_95;
+use crate::fit::error::FitError;
+use crate::fit::identifiability::{Identifiability, examine};
+use crate::input_error::InputError;
+
+/// Gauss–Newton steps for each set of slopes.
+const STEPS: usize = 4;
+/// Sets of slopes at most.
+const ROUNDS: usize = 40;
+/// Converged where −ln of the posterior falls by less: a hundredth of what one standard deviation costs.
+const CONVERGED: f64 = 5e-3;
+/// Rounds of each start before the best goes on.
+const FIRST_ROUNDS: usize = 5;
+/// Starts agree where −ln of the posterior differs by less.
+const SAME_OPTIMUM: f64 = 2.0;
+/// Around the file's numbers the search is started at these ln of factors on v0, stiffness and damping too.
+const SPREAD: [[f64; 3]; 4] = [[0.8, 0.5, 0.7], [0.8, -0.5, -0.7], [-0.8, 0.5, -0.7], [-0.8, -0.5, 0.7]];
+/// A parameter whose 95 % interval is wider than a factor of e either way is not determined: its prior says as much.
+const UNDETERMINED: f64 = 1.0;
+/// On the bound from here: of three deviations the bound's slope leaves a tenth.
+const ON_BOUND: f64 = 0.95;
+/// Fewest samples for a parameter.
+const SAMPLES_PER_PARAMETER: usize = 10;
+
+/// An identified contact.
+#[derive(Debug, Clone)]
+pub struct ContactFit {
+    /// The model; intervals of what is determined.
+    pub model: ModelFile,
+    /// Names of the free parameters.
+    pub names: Vec<String>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub std: Vec<f64>,
+    /// Ends of their 95 % intervals, even in the logarithm; `None` where these logs do not determine them.
+    pub ends: Vec<Option<(f64, f64)>>,
+    /// Their correlations.
+    pub correlations: DMatrix<f64>,
+    /// How much later than the rig file says the friction channel is, ms, and its standard deviation.
+    pub late_ms: (f64, f64),
+    /// Smallest over largest singular value of the scaled Jacobian.
+    pub singular_ratio: f64,
+    /// Parameters that ended on a bound.
+    pub on_bound: Vec<String>,
+    /// Starts that ended at the same optimum.
+    pub starts_agreeing: usize,
+    /// RMS error over RMS of the friction torque, by the observed slip, over all logs.
+    pub nrmse_by_observed_slip: f64,
+    /// Passes over the logs that it took, about.
+    pub passes: u64,
+    /// Points of the logs on the engine's grid.
+    pub points: usize,
+}
+
+impl ContactFit {
+    /// Names of what these logs do not determine.
+    pub fn undetermined(&self) -> Vec<&str> {
+        self.names.iter().zip(&self.ends).filter(|(_, e)| e.is_none()).map(|(n, _)| n.as_str()).collect()
+    }
+}
+
+/// Whether each free parameter changes what the channel shows, and by its own.
+fn examined(problem: &Problem<'_>, p: &[f64], r: &[f64]) -> Result<f64, FitError> {
+    let columns = problem.jacobian(&[], p, r);
+    let free: Vec<usize> =
+        (0..p.len()).filter(|i| problem.baseline.free[*i].role != Role::Late).collect();
+    let named = |at: Vec<usize>| -> Vec<String> {
+        at.into_iter().map(|i| problem.baseline.free[free[i]].parameter.name.clone()).collect()
+    };
+    match examine(&DMatrix::from_fn(r.len(), free.len(), |t, i| columns[free[i]][t])) {
+        Identifiability::Full { singular_ratio } => Ok(singular_ratio),
+        Identifiability::NoInfluence(at) => Err(FitError::NoInfluence { names: named(at) }),
+        Identifiability::Inseparable { parameters, singular_ratio } => {
+            Err(FitError::Inseparable { names: named(parameters), singular_ratio })
+        }
+    }
+}
+
+fn starts(baseline: &Baseline) -> Vec<Vec<f64>> {
+    let file: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+    let moved = SPREAD.iter().map(|factors| {
+        let off = |role: Role| match role {
+            Role::V0 => factors[0],
+            Role::Stiffness => factors[1],
+            Role::Damping => factors[2],
+            _ => 0.0,
+        };
+        baseline.free.iter().zip(&file).map(|(base, start)| start + off(base.role)).collect()
+    });
+    std::iter::once(file.clone()).chain(moved).collect()
+}
+
+/// Gauss–Newton with fresh slopes until it gains nothing.
+fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, told: &(dyn Fn() + Sync)) -> Fit {
+    let mut best = problem.fit(&[], start, STEPS, None);
+    for _ in 1..rounds {
+        told();
+        let next = problem.fit(&[], best.p.clone(), STEPS, None);
+        let gained = best.cost - next.cost;
+        best = next;
+        if gained < CONVERGED {
+            break;
+        }
+    }
+    best
+}
+
+/// Identifies the parameters `free` of `model` from logs. `told` hears of every round of the search.
+///
+/// # Errors
+/// Logs without the columns; parameters that are unknown, that these logs do not show, or that they cannot part.
+pub fn identify(
+    model: &ModelFile,
+    rig: &RigFile,
+    logs: &[Log],
+    free: &[String],
+    told: &(dyn Fn() + Sync),
+) -> Result<ContactFit, InputError> {
+    let refuse = |why: FitError| InputError::new(why.to_string()).file(model.source.as_str());
+    let baseline = baseline_of(model, free)?;
+    let logs = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+    let points: usize = logs.iter().map(ContactLog::len).sum();
+    let samples = logs.iter().flat_map(|log| &log.usable).filter(|used| **used).count();
+    let needed = SAMPLES_PER_PARAMETER * baseline.free.len();
+    if samples < needed {
+        return Err(refuse(FitError::TooFewSamples { samples, needed }));
+    }
+    let mut problem = Problem::new(&logs, &baseline, &[]);
+    let starts = starts(&baseline);
+    examined(&problem, &starts[0], &problem.residuals(&[], &starts[0])).map_err(refuse)?;
+
+    let mut found: Vec<Fit> =
+        starts.into_par_iter().map(|start| converged(&problem, start, FIRST_ROUNDS, told)).collect();
+    found.retain(|fit| fit.cost.is_finite());
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Some(best) = found.first() else { return Err(refuse(FitError::NotFinite)) };
+    let starts_agreeing = found.iter().filter(|fit| fit.cost < best.cost + SAME_OPTIMUM).count();
+
+    // The noise model begins with slopes and transitions of the numbers found, not of the file's.
+    let mut there = baseline.clone();
+    there.free.iter_mut().zip(&best.p).for_each(|(base, p)| base.parameter.mean = *p);
+    problem.noise = Problem::new(&logs, &there, &[]).noise;
+    let mut fit = converged(&problem, best.p.clone(), ROUNDS, told);
+    for _ in 0..2 {
+        problem.noise.refit(&logs, &fit.r);
+        fit = converged(&problem, fit.p.clone(), ROUNDS, told);
+    }
+    let singular_ratio = examined(&problem, &fit.p, &fit.r).map_err(refuse)?;
+
+    let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
+    let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
+    let of_p = covariance(&problem.jacobian(&[], &fit.p, &fit.r), &fit.r, &lengths, &prior_sd);
+    let to_log = log_derivatives(model, &baseline, &fit.p, free);
+    let of_log = &to_log * &of_p * to_log.transpose();
+    let values = values(model, &baseline, &fit.p, free);
+    let mut fitted = model.clone();
+    let (mut std, mut ends) = (Vec::new(), Vec::new());
+    for (i, name) in free.iter().enumerate() {
+        let relative = of_log[(i, i)].max(0.0).sqrt();
+        std.push(values[i] * relative);
+        let factor = (INTERVAL_95 * relative).exp();
+        let determined = INTERVAL_95 * relative < UNDETERMINED;
+        ends.push(determined.then_some((values[i] / factor, values[i] * factor)));
+    }
+    set_all(&mut fitted, free, &values)?;
+    for (i, name) in free.iter().enumerate() {
+        match ends[i] {
+            Some((low, high)) => {
+                fitted.intervals.insert(name.clone(), Interval { std: std[i], low, high });
+            }
+            None => {
+                fitted.intervals.remove(name);
+            }
+        }
+    }
+    let on_bound = baseline
+        .free
+        .iter()
+        .zip(&fit.p)
+        .filter(|(base, p)| ((*p - base.parameter.mean) / (3.0 * base.parameter.sd)).tanh().abs() > ON_BOUND)
+        .map(|(base, _)| base.parameter.name.clone())
+        .collect();
+    let (error, signal) = problem
+        .measured()
+        .zip(problem.predict(&[], &fit.p).shown_nm)
+        .fold((0.0, 0.0), |(error, signal), (y, x)| (error + (y - x) * (y - x), signal + y * y));
+    let late = baseline.free.iter().position(|base| base.role == Role::Late);
+    Ok(ContactFit {
+        model: fitted,
+        names: free.to_vec(),
+        values,
+        std,
+        ends,
+        correlations: crate::fit::covariance::correlations(&of_log),
+        late_ms: late.map_or((0.0, 0.0), |at| (baseline.bounded(&fit.p, at), of_p[(at, at)].sqrt())),
+        singular_ratio,
+        on_bound,
+        starts_agreeing,
+        nrmse_by_observed_slip: (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt(),
+        passes: 0,
+        points,
+    })
+}
+
+/// Sets the file's numbers, whichever way they bound each other.
+fn set_all(model: &mut ModelFile, names: &[String], values: &[f64]) -> Result<(), InputError> {
+    let each = || names.iter().zip(values);
+    // Static above kinetic friction: raised first what is to be raised.
+    for (name, value) in each().chain(each()) {
+        if model.set(name, *value).is_err() {
+            continue;
+        }
+    }
+    each().try_for_each(|(name, value)| model.set(name, *value))
+}
