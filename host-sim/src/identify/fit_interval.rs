@@ -31,7 +31,9 @@ pub fn covariance(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: 
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let slope: Vec<f64> = r
         .iter()
-        .map(|r| if *r == 0.0 { 0.0 } else { (FREEDOM + 1.0) * (FREEDOM - r * r) / (FREEDOM + r * r).powi(2) })
+        .map(
+            |r| if *r == 0.0 { 0.0 } else { (FREEDOM + 1.0) * (FREEDOM - r * r) / (FREEDOM + r * r).powi(2) },
+        )
         .collect();
     // In units of the prior, so that the inverse is of numbers of one size.
     let scaled: Vec<Vec<f64>> =

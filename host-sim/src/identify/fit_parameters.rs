@@ -97,7 +97,8 @@ pub fn baseline_of(model: &ModelFile, free: &[String]) -> Result<Baseline, Input
             Role::Damping => numbers.damping_n_s_per_m,
             Role::Factor | Role::Late => 1.0,
         };
-        let parameter = Parameter { step: 0.01, reach: 0.5, ..Parameter::logarithm(name.as_str(), value, sd) };
+        let parameter =
+            Parameter { step: 0.01, reach: 0.5, ..Parameter::logarithm(name.as_str(), value, sd) };
         parameters.push(BaseParameter { role, parameter });
     }
     parameters.sort_by_key(|base| base.role == Role::Factor);

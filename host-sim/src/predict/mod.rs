@@ -11,6 +11,7 @@
 mod bridge;
 pub mod curve;
 mod drive;
+pub mod drive_model;
 mod extended;
 mod friction;
 mod inputs;
@@ -20,7 +21,7 @@ mod second_order;
 
 pub use bridge::BridgeModel;
 pub use drive::predict_drive;
-pub use extended::effects_elsewhere;
+pub use extended::{acts_on_friction, effects_elsewhere};
 pub use friction::{
     Accuracy, StepPlan, drive_contact, simulate_friction, simulate_friction_as, simulate_planned,
 };

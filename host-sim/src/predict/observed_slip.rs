@@ -22,11 +22,7 @@ pub const COLUMN: &str = "predicted_by_observed_slip";
 ///
 /// # Errors
 /// Where the log is none of a contact.
-pub fn predict_by_observed_slip(
-    model: &ModelFile,
-    rig: &RigFile,
-    log: &Log,
-) -> Result<Vec<f64>, InputError> {
+pub fn predict_by_observed_slip(model: &ModelFile, rig: &RigFile, log: &Log) -> Result<Vec<f64>, InputError> {
     let logs = [ContactLog::new(log, rig)?];
     let baseline = Baseline { free: Vec::new(), ..baseline::baseline(model, baseline::KNOWN_WITHIN) };
     let shown = Problem::new(&logs, &baseline, &[]).predict(&[], &[]).shown_nm;

@@ -94,6 +94,8 @@ pub struct Contact {
     pub stiffness_n_per_m: f64,
     /// Its damping, N s/m.
     pub damping_n_s_per_m: f64,
+    /// Stiffness of bristles in series with it, N/m; infinite where they are the stiffness itself.
+    pub bristles_n_per_m: f64,
     /// Stiffness of the Maxwell branches beside it, N/m.
     pub branches_n_per_m: [f64; 3],
     /// Friction per slip speed: per load, s/m, and whatever the load, N s/m.

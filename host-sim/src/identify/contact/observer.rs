@@ -142,6 +142,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     }
     let block = Block::new(contact, dt);
     let (k, c) = (contact.stiffness_n_per_m, contact.damping_n_s_per_m);
+    // While the tip sticks the bristles take their share of the root's way.
+    let share = 1.0 / (1.0 + k / contact.bristles_n_per_m);
     let force = drive.force_n;
     let mut start = SVector::<f64, 4>::zeros();
     start[0] = force[0] / k;
@@ -201,8 +203,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             0.0
         };
         if slips < 1.0 - 1e-9 {
-            let moved = way;
-            let mut sticking = k * (held[0] + moved) + c * v;
+            let moved = share * way;
+            let mut sticking = k * (held[0] + moved) + c * share * v;
             for b in 0..3 {
                 sticking += contact.branches_n_per_m[b] * (held[1 + b] + moved) * branch[b];
             }

@@ -70,6 +70,8 @@ pub struct Numbers {
     pub stiffness_n_per_m: f64,
     /// Its damping, N s/m.
     pub damping_n_s_per_m: f64,
+    /// Stiffness of bristles in series with a block, N/m; infinite where there is no block.
+    pub bristles_n_per_m: f64,
     /// Lateness of the channel beyond the rig file's, ms.
     pub late_ms: f64,
 }
@@ -196,6 +198,7 @@ impl<'a> Problem<'a> {
             curve,
             stiffness_n_per_m: k,
             damping_n_s_per_m: c,
+            bristles_n_per_m: n.bristles_n_per_m,
             branches_n_per_m: change.branches_n_per_m,
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,
