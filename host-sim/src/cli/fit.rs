@@ -301,7 +301,7 @@ fn write_contact(
         fit: found,
         nrmse_by_observed_slip: fit.nrmse_by_observed_slip,
         undetermined,
-        channel_late_ms: fit.late_ms.0,
+        channel_late_ms: fit.late_ms,
         singular_ratio: fit.singular_ratio,
         on_bound: fit.on_bound.clone(),
         starts_agreeing: fit.starts_agreeing,

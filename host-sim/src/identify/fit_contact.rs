@@ -12,10 +12,11 @@ use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, Fit, Problem, Role};
 use super::fit_interval::covariance;
 use super::fit_parameters::{baseline_of, log_derivatives, values};
+use super::fit_posterior::{points, quantile, spread};
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
 use crate::files::rig_file::RigFile;
-use crate::fit::covariance::INTERVAL_95;
+use crate::fit::covariance::{INTERVAL_95, correlations};
 use crate::fit::error::FitError;
 use crate::fit::identifiability::{Identifiability, examine};
 use crate::input_error::InputError;
@@ -23,7 +24,7 @@ use crate::input_error::InputError;
 /// Gauss–Newton steps for each set of slopes.
 const STEPS: usize = 4;
 /// Sets of slopes at most.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 12;
 /// Converged where −ln of the posterior falls by less: a hundredth of what one standard deviation costs.
 const CONVERGED: f64 = 5e-3;
 /// Rounds of each start before the best goes on.
@@ -34,6 +35,8 @@ const SAME_OPTIMUM: f64 = 2.0;
 const SPREAD: [[f64; 3]; 4] = [[0.8, 0.5, 0.7], [0.8, -0.5, -0.7], [-0.8, 0.5, -0.7], [-0.8, -0.5, 0.7]];
 /// A parameter whose 95 % interval is wider than a factor of e either way is not determined: its prior says as much.
 const UNDETERMINED: f64 = 1.0;
+/// The likelihood's own covariance is taken under a prior so many times wider, so that it has an inverse.
+const WIDER: f64 = 1e3;
 /// On the bound from here: of three deviations the bound's slope leaves a tenth.
 const ON_BOUND: f64 = 0.95;
 /// Fewest samples for a parameter.
@@ -54,8 +57,8 @@ pub struct ContactFit {
     pub ends: Vec<Option<(f64, f64)>>,
     /// Their correlations.
     pub correlations: DMatrix<f64>,
-    /// How much later than the rig file says the friction channel is, ms, and its standard deviation.
-    pub late_ms: (f64, f64),
+    /// How much later than the rig file says the friction channel is, ms.
+    pub late_ms: f64,
     /// Smallest over largest singular value of the scaled Jacobian.
     pub singular_ratio: f64,
     /// Parameters that ended on a bound.
@@ -160,20 +163,26 @@ pub fn identify(
     let singular_ratio = examined(&problem, &fit.p, &fit.r).map_err(refuse)?;
 
     let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
+    let prediction = problem.predict(&[], &fit.p);
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
-    let of_p = covariance(&problem.jacobian(&[], &fit.p, &fit.r), &fit.r, &lengths, &prior_sd);
-    let to_log = log_derivatives(model, &baseline, &fit.p, free);
-    let of_log = &to_log * &of_p * to_log.transpose();
+    let columns = problem.jacobian(&[], &fit.p, &fit.r);
+    let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
+    let slid = prediction.observed.iter().flat_map(|o| {
+        o.slip_m_s.iter().zip(&o.sliding).filter(|(_, s)| **s > 0.5).map(|(w, _)| w.abs()).filter(|w| *w > 0.0)
+    });
+    let of_p = covariance(&columns, &fit.r, &lengths, &alone);
+    let points = points(&baseline, &fit.p, &of_p, slid.collect());
     let values = values(model, &baseline, &fit.p, free);
+    let uncertain = match &points {
+        Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),
+        None => {
+            let of_p = covariance(&columns, &fit.r, &lengths, &prior_sd);
+            let to_log = log_derivatives(model, &baseline, &fit.p, free);
+            Uncertain::about(&values, &(&to_log * of_p * to_log.transpose()))
+        }
+    };
+    let Uncertain { std, ends, correlations } = uncertain;
     let mut fitted = model.clone();
-    let (mut std, mut ends) = (Vec::new(), Vec::new());
-    for (i, name) in free.iter().enumerate() {
-        let relative = of_log[(i, i)].max(0.0).sqrt();
-        std.push(values[i] * relative);
-        let factor = (INTERVAL_95 * relative).exp();
-        let determined = INTERVAL_95 * relative < UNDETERMINED;
-        ends.push(determined.then_some((values[i] / factor, values[i] * factor)));
-    }
     set_all(&mut fitted, free, &values)?;
     for (i, name) in free.iter().enumerate() {
         match ends[i] {
@@ -194,7 +203,7 @@ pub fn identify(
         .collect();
     let (error, signal) = problem
         .measured()
-        .zip(problem.predict(&[], &fit.p).shown_nm)
+        .zip(&prediction.shown_nm)
         .fold((0.0, 0.0), |(error, signal), (y, x)| (error + (y - x) * (y - x), signal + y * y));
     let late = baseline.free.iter().position(|base| base.role == Role::Late);
     Ok(ContactFit {
@@ -203,13 +212,67 @@ pub fn identify(
         values,
         std,
         ends,
-        correlations: crate::fit::covariance::correlations(&of_log),
-        late_ms: late.map_or((0.0, 0.0), |at| (baseline.bounded(&fit.p, at), of_p[(at, at)].sqrt())),
+        correlations,
+        late_ms: late.map_or(0.0, |at| baseline.bounded(&fit.p, at)),
         singular_ratio,
         on_bound,
         starts_agreeing,
         nrmse_by_observed_slip: (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt(),
     })
+}
+
+/// What is known of the file's parameters.
+struct Uncertain {
+    std: Vec<f64>,
+    ends: Vec<Option<(f64, f64)>>,
+    correlations: DMatrix<f64>,
+}
+
+/// Ends of an interval, where it is narrow enough to say something.
+fn determined(low: f64, high: f64) -> Option<(f64, f64)> {
+    ((high / low).ln() < 2.0 * UNDETERMINED).then_some((low, high))
+}
+
+impl Uncertain {
+    /// From the covariance of logarithms.
+    fn about(values: &[f64], of_log: &DMatrix<f64>) -> Self {
+        let relative = |i: usize| of_log[(i, i)].max(0.0).sqrt();
+        let ends = |i: usize| {
+            let factor = (INTERVAL_95 * relative(i)).exp();
+            determined(values[i] / factor, values[i] * factor)
+        };
+        Self {
+            std: (0..values.len()).map(|i| values[i] * relative(i)).collect(),
+            ends: (0..values.len()).map(ends).collect(),
+            correlations: correlations(of_log),
+        }
+    }
+
+    /// From points of the posterior.
+    fn of_points(
+        model: &ModelFile,
+        baseline: &Baseline,
+        free: &[String],
+        values: &[f64],
+        points: &[Vec<f64>],
+    ) -> Self {
+        let logs: Vec<Vec<f64>> = points
+            .iter()
+            .map(|p| self::values(model, baseline, p, free).into_iter().map(f64::ln).collect())
+            .collect();
+        let of_log = spread(&logs);
+        let (mut std, mut ends) = (Vec::new(), Vec::new());
+        for (i, value) in values.iter().enumerate() {
+            let mut own: Vec<f64> = logs.iter().map(|x| x[i]).collect();
+            // Quantiles of the normal's 95 %, widened as Student's t asks for the blocks' count.
+            let widened = |x: f64| value.ln() + (x - value.ln()) * INTERVAL_95 / 1.96;
+            let low = widened(quantile(&mut own, 0.025)).exp().min(*value);
+            let high = widened(quantile(&mut own, 0.975)).exp().max(*value);
+            std.push(value * of_log[(i, i)].sqrt());
+            ends.push(determined(low, high));
+        }
+        Self { std, ends, correlations: correlations(&of_log) }
+    }
 }
 
 /// Sets the file's numbers, whichever way they bound each other.

@@ -8,6 +8,7 @@ pub mod filters;
 pub mod fit_contact;
 mod fit_interval;
 pub mod fit_parameters;
+mod fit_posterior;
 pub mod grid;
 pub mod judge;
 pub mod linear;

@@ -158,7 +158,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     for i in 1..n {
         // Even about the sample: means before and after it, so that the law is not late by half a step.
         let at = |i: usize| out.sliding[i.clamp(1, n - 1)];
-        out.slip_m_s[i] = 0.125 * (at(i - 1) + at(i + 2)) + 0.375 * (at(i) + at(i + 1));
+        out.slip_m_s[i] = 0.5 * (at(i) + at(i + 1));
     }
 
     let (per_log, log_slowest) = Curve::scale_of_table();
