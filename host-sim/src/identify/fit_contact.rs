@@ -168,7 +168,12 @@ pub fn identify(
     let columns = problem.jacobian(&[], &fit.p, &fit.r);
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
     let slid = prediction.observed.iter().flat_map(|o| {
-        o.slip_m_s.iter().zip(&o.sliding).filter(|(_, s)| **s > 0.5).map(|(w, _)| w.abs()).filter(|w| *w > 0.0)
+        o.slip_m_s
+            .iter()
+            .zip(&o.sliding)
+            .filter(|(_, s)| **s > 0.5)
+            .map(|(w, _)| w.abs())
+            .filter(|w| *w > 0.0)
     });
     let of_p = covariance(&columns, &fit.r, &lengths, &alone);
     let points = points(&baseline, &fit.p, &of_p, slid.collect());

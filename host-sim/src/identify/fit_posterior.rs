@@ -46,9 +46,10 @@ impl Seen<'_> {
 
     fn at(&self, p: &[f64]) -> DVector<f64> {
         let n = self.baseline.numbers(p);
-        let curve = self.speeds_m_s.iter().map(|w| {
-            (n.a0 + n.a1 * (-(w / n.v0_m_s).powf(n.delta)).exp() + n.a2_s_per_m * w).ln()
-        });
+        let curve = self
+            .speeds_m_s
+            .iter()
+            .map(|w| (n.a0 + n.a1 * (-(w / n.v0_m_s).powf(n.delta)).exp() + n.a2_s_per_m * w).ln());
         let rest = (0..p.len())
             .filter(|i| !Self::is_curve(self.baseline.free[*i].role))
             .map(|i| self.baseline.bounded(p, i));
@@ -94,7 +95,8 @@ pub(super) fn points(
     let seen = Seen { baseline, speeds_m_s: speeds(slid_m_s, count)? };
     let g = seen.derivatives(p);
     let singular = g.clone().svd(false, false).singular_values;
-    if !(singular.min() > LOST * singular.max()) {
+    let ratio = singular.min() / singular.max();
+    if ratio.is_nan() || ratio < LOST {
         return None;
     }
     let mut of_seen = &g * covariance * g.transpose();
