@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use nalgebra::DMatrix;
@@ -9,19 +10,21 @@ use serde::Serialize;
 
 use super::common::{SetArgs, say};
 use super::progress::Progress;
-use crate::diagnose::analysis::Role;
-use crate::diagnose::record::Record;
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
 use crate::files::number;
 use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
-use crate::fit::contact::{self, ContactFit};
 use crate::fit::covariance::INTERVAL_95;
 use crate::fit::drive::inverse::{DriveFit, Friction, Motion, identify};
-use crate::fit::drive::record::{DriveRecord, FEWEST_SAMPLES};
+use crate::fit::drive::record::DriveRecord;
+use crate::identify::fit_contact::{self, ContactFit};
+use crate::identify::fit_parameters;
 use crate::input_error::InputError;
+use crate::predict::drive_model;
+use crate::predict::observed_slip::{self, predict_by_observed_slip};
+use crate::predict::{Comparison, ContactInputs, simulate_friction};
 
 /// Identify the parameters of a friction model, or of a drive, from logs
 #[derive(clap::Args, Debug)]
@@ -31,16 +34,19 @@ Examples:
   rig fit --train drive.csv --out target/drive
 
 Contact logs (time_s, m2_speed_rad_s or m2_angle_rad, normal_force_n, friction_torque_nm): the friction
-model's parameters, by least squares of the simulated friction torque, started from the model file and
-from the data. Held unless --free names them: theta and delta always, sigma1_n_s_per_m and a2_s_per_m
-where they are 0, sigma0_n_per_m of the series model. What the logs cannot identify is refused by name.
+model's parameters, by the likelihood of the friction torque that the law makes of the slip observed from the
+measured force, started from the model file, which may be wrong by a factor of two, and around it. Held unless
+--free names them: theta and delta always, sigma1_n_s_per_m and a2_s_per_m where they are 0, sigma0_n_per_m of
+the series model. What the logs do not show at all, or only together with another parameter, is refused by
+name; what they show too little of has no interval and is listed as \"not determined by these logs\".
 Drive logs (time_s, m2_torque_nm, m2_angle_rad, or time_s, force_n, position_m): inertia or mass, viscous
 and Coulomb friction and offset, by least squares of the force that the measured motion asks for; once
 with the same friction in both directions, once with friction per direction. --rig and --model are not
 needed.
 
 Writes model.toml (values, standard deviations, 95 % intervals, correlations as comments), summary.json
-(the same, and the error) and prediction.csv or prediction_1.csv … (measured, predicted, residual).")]
+(the same, and the error) and prediction.csv or prediction_1.csv … (measured, predicted, residual; predicted
+is the simulation in open loop, predicted_by_observed_slip the one-step prediction that was fitted).")]
 pub(super) struct Fit {
     /// Rig file (TOML); the assumed rig where left out
     #[arg(long, value_name = "RIG.toml")]
@@ -85,10 +91,17 @@ struct ContactSummary {
     kind: &'static str,
     #[serde(flatten)]
     fit: Part,
+    /// Of the friction law at the slip observed from the measured force: what was fitted.
+    nrmse_by_observed_slip: f64,
+    /// Parameters that these logs do not determine within a factor of e; they have no interval.
+    undetermined: Vec<String>,
+    /// How much later than the rig file says the friction channel is, found beside the parameters.
+    channel_late_ms: f64,
     singular_ratio: f64,
     on_bound: Vec<String>,
     starts_agreeing: usize,
-    simulations: u64,
+    /// Sets of derivatives that the search took.
+    rounds: u64,
     samples: usize,
     assumed: Vec<String>,
 }
@@ -101,11 +114,26 @@ struct DriveSummary {
     samples: usize,
 }
 
-fn part(names: &[&str], values: &[f64], std: &[f64], correlations: &DMatrix<f64>, nrmse: f64) -> Part {
+/// Ends of 95 % intervals even about the values.
+fn even_ends(values: &[f64], std: &[f64]) -> Vec<Option<(f64, f64)>> {
+    let ends = |(value, std): (&f64, &f64)| {
+        std.is_finite().then_some((value - INTERVAL_95 * std, value + INTERVAL_95 * std))
+    };
+    values.iter().zip(std).map(ends).collect()
+}
+
+/// Where there are no ends a parameter is not determined.
+fn part(
+    names: &[&str],
+    values: &[f64],
+    std: &[f64],
+    ends: &[Option<(f64, f64)>],
+    correlations: &DMatrix<f64>,
+    nrmse: f64,
+) -> Part {
     let parameter = |i: usize| {
-        let finite = std[i].is_finite().then_some(std[i]);
-        let end = |sign: f64| finite.map(|std| values[i] + sign * INTERVAL_95 * std);
-        Parameter { value: values[i], std: finite, low_95: end(-1.0), high_95: end(1.0) }
+        let (low_95, high_95) = ends[i].unzip();
+        Parameter { value: values[i], std: ends[i].map(|_| std[i]), low_95, high_95 }
     };
     let mut pairs = BTreeMap::new();
     for i in 0..names.len() {
@@ -133,7 +161,7 @@ impl Part {
             let Some(p) = self.parameters.get(*name) else { continue };
             match p.std {
                 Some(std) => say(&format!("{name:32} {:12.6}  ± {std:.2e}", p.value)),
-                None => say(&format!("{name:32} {:12.6}", p.value)),
+                None => say(&format!("{name:32} {:12.6}  not determined by these logs", p.value)),
             }
         }
     }
@@ -157,7 +185,8 @@ impl Fit {
         let rig = RigFile::read_or_assumed(self.rig.as_deref(), &overrides.rig)?;
         let model = ModelFile::read_or_assumed(self.model.as_deref(), &overrides.model)?;
         let output = OutputDir::new(&self.out)?;
-        let mut free = if self.free.is_empty() { contact::default_free(&model) } else { self.free.clone() };
+        let mut free =
+            if self.free.is_empty() { fit_parameters::default_free(&model) } else { self.free.clone() };
         for name in &self.fix {
             if model.get(name).is_none() {
                 let names: Vec<&str> = model.parameters().map(|(name, _)| name).collect();
@@ -168,50 +197,16 @@ impl Fit {
             }
             free.retain(|free| free != name);
         }
-        let records =
-            logs.iter().map(|log| Record::new(log, Role::Train, &rig)).collect::<Result<Vec<_>, _>>()?;
-        // About what two starts and the last search take.
-        let expected = (logs.len() * 30 * (2 * free.len() + 1)) as u64;
-        let progress = Mutex::new(Progress::new("simulating", expected));
-        let told = || progress.lock().unwrap_or_else(PoisonError::into_inner).advance(1);
-        let fit = contact::identify(&model, &rig, &records, &free, &told)?;
-        drop(progress);
-        self.write_contact(output, &fit, &records, &rig)
-    }
-
-    fn write_contact(
-        &self,
-        mut output: OutputDir,
-        fit: &ContactFit,
-        records: &[Record],
-        rig: &RigFile,
-    ) -> Result<(), InputError> {
-        let names: Vec<&str> = fit.names.iter().map(String::as_str).collect();
-        let found = part(&names, &fit.values, &fit.std, &fit.correlations, fit.nrmse);
-        output.write("model.toml", found.comments() + &fit.model.to_toml())?;
-        found.print(&names);
-        for name in &fit.on_bound {
-            say(&format!("{name} ended on a bound: it is outside of what is searched, or not needed"));
-        }
-        say(&format!("friction  nrmse {:.3e}", fit.nrmse));
-        for (i, (record, comparison)) in records.iter().zip(&fit.comparisons).enumerate() {
-            let residual = comparison.residual();
-            let columns =
-                (record.time_s.clone(), comparison.measured.clone(), comparison.predicted.clone(), residual);
-            output.write_table(&table_name(i, records.len()), &table(columns))?;
-        }
-        let summary = ContactSummary {
-            kind: fit.model.kind.name(),
-            fit: found,
-            singular_ratio: fit.singular_ratio,
-            on_bound: fit.on_bound.clone(),
-            starts_agreeing: fit.starts_agreeing,
-            simulations: fit.simulations,
-            samples: records.iter().map(Record::len).sum(),
-            assumed: rig.assumed.clone(),
+        // Five starts of at most five rounds, then some ten to converge.
+        let progress = Mutex::new(Progress::new("fitting", 35));
+        let rounds = AtomicU64::new(0);
+        let told = || {
+            rounds.fetch_add(1, Ordering::Relaxed);
+            progress.lock().unwrap_or_else(PoisonError::into_inner).advance(1);
         };
-        output.write_json("summary.json", &summary)?;
-        finish(output)
+        let fit = fit_contact::identify(&model, &rig, logs, &free, &told)?;
+        drop(progress);
+        write_contact(output, &fit, logs, &rig, rounds.into_inner())
     }
 
     fn drive(&self, logs: &[Log], motion: Motion) -> Result<(), InputError> {
@@ -221,7 +216,7 @@ impl Fit {
                 .allowed("--free and --fix for contact logs"));
         }
         let mut output = OutputDir::new(&self.out)?;
-        let records = logs.iter().map(drive_record).collect::<Result<Vec<_>, _>>()?;
+        let records = logs.iter().map(drive_model::record).collect::<Result<Vec<_>, _>>()?;
         let refuse = |why: crate::fit::error::FitError| {
             InputError::new(why.to_string())
                 .file(logs.iter().map(|l| l.source.as_str()).collect::<Vec<_>>().join(", "))
@@ -230,7 +225,8 @@ impl Fit {
         // Motion in one direction only does not tell the other's friction; the symmetric model stands.
         let directed = identify(&records, Friction::PerDirection, motion).ok();
         let summed = |fit: &DriveFit| {
-            part(fit.names, &fit.values, &fit.std, &fit.correlations, fit.relative_force_error)
+            let ends = even_ends(&fit.values, &fit.std);
+            part(fit.names, &fit.values, &fit.std, &ends, &fit.correlations, fit.relative_force_error)
         };
         let main = summed(&symmetric);
         main.print(symmetric.names);
@@ -263,6 +259,60 @@ impl Fit {
     }
 }
 
+fn write_contact(
+    mut output: OutputDir,
+    fit: &ContactFit,
+    logs: &[Log],
+    rig: &RigFile,
+    rounds: u64,
+) -> Result<(), InputError> {
+    let names: Vec<&str> = fit.names.iter().map(String::as_str).collect();
+    // The model that was fitted has no effects, whatever the file keeps.
+    let mut plain = fit.model.clone();
+    plain.extensions.clear();
+    let (mut error, mut signal) = (0.0, 0.0);
+    for (i, log) in logs.iter().enumerate() {
+        let signals = log.contact()?;
+        let comparison = Comparison {
+            measured: signals.friction_torque_nm.to_vec(),
+            predicted: simulate_friction(&plain, rig, &ContactInputs::new(&signals, rig))?,
+        };
+        let residual = comparison.residual();
+        error += residual.iter().map(|x| x * x).sum::<f64>();
+        signal += comparison.measured.iter().map(|x| x * x).sum::<f64>();
+        let time_s = signals.time_s.to_vec();
+        let mut table = table((time_s, comparison.measured, comparison.predicted, residual));
+        table.set_numbers(observed_slip::COLUMN, predict_by_observed_slip(&plain, rig, log)?);
+        output.write_table(&table_name(i, logs.len()), &table)?;
+    }
+    let nrmse = (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt();
+    let undetermined: Vec<String> = fit.undetermined().into_iter().map(String::from).collect();
+    let found = part(&names, &fit.values, &fit.std, &fit.ends, &fit.correlations, nrmse);
+    let remarks: String =
+        undetermined.iter().map(|name| format!("# {name}: not determined by these logs\n")).collect();
+    output.write("model.toml", found.comments() + &remarks + &fit.model.to_toml())?;
+    found.print(&names);
+    for name in &fit.on_bound {
+        say(&format!("{name} ended on a bound: it is outside of what is searched, or not needed"));
+    }
+    say(&format!("friction  nrmse {nrmse:.3e}, by the observed slip {:.3e}", fit.nrmse_by_observed_slip));
+    let summary = ContactSummary {
+        kind: fit.model.kind.name(),
+        fit: found,
+        nrmse_by_observed_slip: fit.nrmse_by_observed_slip,
+        undetermined,
+        channel_late_ms: fit.late_ms,
+        singular_ratio: fit.singular_ratio,
+        on_bound: fit.on_bound.clone(),
+        starts_agreeing: fit.starts_agreeing,
+        rounds,
+        samples: logs.iter().map(Log::len).sum(),
+        assumed: rig.assumed.clone(),
+    };
+    output.write_json("summary.json", &summary)?;
+    finish(output)
+}
+
 /// The drive as TOML: symmetric friction, and friction per direction in a table of its own.
 fn drive_toml(main: &Part, symmetric: &DriveFit, directed: Option<&DriveFit>) -> String {
     let mut text = main.comments() + "kind = \"drive\"\n\n[parameters]\n";
@@ -283,15 +333,6 @@ fn drive_toml(main: &Part, symmetric: &DriveFit, directed: Option<&DriveFit>) ->
         text += &lines(directed);
     }
     text
-}
-
-fn drive_record(log: &Log) -> Result<DriveRecord, InputError> {
-    let signals = log.drive()?;
-    DriveRecord::new(signals.time_s, signals.effort, signals.position).ok_or_else(|| {
-        InputError::new(format!("{} samples", log.len()))
-            .file(log.source.as_str())
-            .allowed(format!("at least {FEWEST_SAMPLES} samples"))
-    })
 }
 
 fn same_kind(logs: &[Log]) -> Result<LogKind, InputError> {

@@ -1,4 +1,4 @@
-//! `rig predict`: a friction model driven with the measured inputs of a log.
+//! `rig predict`: a model driven with the measured inputs of a log.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -6,34 +6,47 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::common::{SetArgs, say};
+use crate::files::drive_model::DriveModel;
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::input_error::InputError;
+use crate::predict::drive_model::predict_drive_log;
+use crate::predict::observed_slip::{self, predict_by_observed_slip};
 use crate::predict::{
-    Comparison, ContactInputs, effects_elsewhere, predict_drive, predict_normal_force, simulate_friction,
+    Comparison, ContactInputs, acts_on_friction, effects_elsewhere, nrmse as nrmse_of, predict_drive,
+    predict_normal_force, simulate_friction,
 };
 
-/// Drive a friction model with the measured inputs of a log; write measured, predicted, residual
+/// Drive a model with the measured inputs of a log; write measured, predicted, residual
 #[derive(clap::Args, Debug)]
 #[command(after_long_help = "\
 Example:
   rig predict --rig rig.toml --model model.toml --log run.csv --out target/predict
+  rig predict --model drive.toml --log drive.csv --out target/predict
 
 Reads time_s, m2_speed_rad_s (or m2_angle_rad), normal_force_n and friction_torque_nm, in SI units, at
 200 Hz to 20 kHz, even or not. The friction model sees the measured speed and normal force; what it says
 goes through the rig's friction bridge and is compared with the measured friction torque.
 Where the log has m1_torque_nm or m2_torque_nm, normal force and M2's torque are predicted too.
+That is a simulation in open loop: where the element sticks and slips it may slip at other instants than the
+rig did. Beside it stands the one-step prediction, the friction law at the slip that the measured force shows.
+
+A model of kind = \"drive\" (as fit and diagnose write it for a drive) is compared with a drive log, time_s,
+m2_torque_nm, m2_angle_rad or time_s, force_n, position_m: the torque or force that the motion asks for, both
+low-passed and decimated to 100 Hz, moving samples only. --rig is not needed.
 
 Writes prediction.csv:
   time_s                           s
   measured, predicted, residual    friction torque, N m; residual = measured - predicted
+                                   (of a drive N m, or N)
+  predicted_by_observed_slip       friction torque one step ahead, N m; models without effects on friction
   normal_force_measured_n, ...     N, from M1's torque
   m2_torque_measured_nm, ...       N m, from inertia, bearing and measured friction, means over 10 ms
 and summary.json with the nrmse (RMS of the residual over RMS of the measured signal) of each subsystem:
-friction, pressure, drive.
+friction, pressure, drive; and nrmse_by_observed_slip, that of the one-step prediction.
 With --out X.parquet the table goes to X.parquet and the summary beside it.
 Effects of the model file that act on the contact or on the friction channel are applied.")]
 pub(super) struct Predict {
@@ -60,9 +73,21 @@ struct Summary {
     simulated_s: f64,
     /// `None` where nothing but zero was measured.
     nrmse: BTreeMap<&'static str, Option<f64>>,
+    /// Of the friction law at the slip observed from the measured force; `None` where the model has effects on friction.
+    nrmse_by_observed_slip: Option<f64>,
     /// Keys of the rig file that were left out and assumed.
     assumed: Vec<String>,
     /// Effects of the model file that act on pressure or drive and are not in this prediction.
+    effects_not_applied: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct DriveSummary {
+    model: &'static str,
+    samples: usize,
+    simulated_s: f64,
+    /// Relative force error: RMS of the residual over RMS of the effort, both low-passed and decimated.
+    nrmse: BTreeMap<&'static str, Option<f64>>,
     effects_not_applied: Vec<String>,
 }
 
@@ -71,11 +96,14 @@ impl Predict {
     pub(super) fn run(self) -> Result<(), InputError> {
         let overrides = self.set.overrides()?;
         overrides.only(true, true, false)?;
+        if let Some(drive) = DriveModel::read_if_drive(&self.model, &overrides.model)? {
+            return self.drive(&drive);
+        }
         let rig = RigFile::read_or_assumed(self.rig.as_deref(), &overrides.rig)?;
         let model = ModelFile::read(&self.model, &overrides.model)?;
         let log = Log::read(&self.log)?;
         let signals = log.contact()?;
-        let mut output = OutputDir::new(&self.out)?;
+        let output = OutputDir::new(&self.out)?;
 
         let inputs = ContactInputs::new(&signals, &rig);
         let friction = Comparison {
@@ -86,6 +114,12 @@ impl Predict {
         table.set_signal(Signal::Time, signals.time_s.to_vec());
         let mut nrmse = BTreeMap::from([("friction", friction.nrmse())]);
         add(&mut table, ["measured", "predicted", "residual"], friction);
+        let mut by_observed_slip = None;
+        if !acts_on_friction(&model) {
+            let predicted = predict_by_observed_slip(&model, &rig, &log)?;
+            by_observed_slip = nrmse_of(signals.friction_torque_nm, &predicted);
+            table.set_numbers(observed_slip::COLUMN, predicted);
+        }
         if let Some(m1_torque_nm) = log.signal(Signal::M1Torque) {
             let pressure = predict_normal_force(&rig, signals.time_s, m1_torque_nm, signals.normal_force_n);
             nrmse.insert("pressure", pressure.nrmse());
@@ -101,28 +135,74 @@ impl Predict {
                 drive,
             );
         }
-        let span_s =
-            signals.time_s.last().zip(signals.time_s.first()).map_or(0.0, |(end, start)| end - start);
         let summary = Summary {
             model: model.kind.name(),
             samples: log.len(),
-            simulated_s: span_s,
+            simulated_s: span_s(signals.time_s),
             nrmse,
+            nrmse_by_observed_slip: by_observed_slip,
             assumed: rig.assumed.clone(),
             effects_not_applied: effects_elsewhere(&model),
         };
-        output.write_table("prediction.csv", &table)?;
-        output.write_json("summary.json", &summary)?;
-        let output_folder = output.folder().to_path_buf();
-        output.finish()?;
-        for (subsystem, nrmse) in &summary.nrmse {
-            match nrmse {
-                Some(nrmse) => say(&format!("{subsystem:9} nrmse {nrmse:.3e}")),
-                None => say(&format!("{subsystem:9} nothing but zero was measured")),
-            }
+        finish(output, &table, &summary)?;
+        tell(&summary.nrmse);
+        if let Some(nrmse) = by_observed_slip {
+            say(&format!("friction  nrmse {nrmse:.3e} one step ahead, by the observed slip"));
         }
-        say(&format!("written to {}", output_folder.display()));
+        say(&format!("written to {}", self.out.display()));
         Ok(())
+    }
+
+    fn drive(&self, model: &DriveModel) -> Result<(), InputError> {
+        let log = Log::read(&self.log)?;
+        let prediction = predict_drive_log(model, &log)?;
+        let output = OutputDir::new(&self.out)?;
+        let (mut table, main) = (Log::default(), prediction.main);
+        table.set_signal(Signal::Time, main.time_s);
+        let main = Comparison { measured: main.measured, predicted: main.predicted };
+        let mut nrmse = BTreeMap::from([("drive", main.nrmse())]);
+        let measured = main.measured.clone();
+        add(&mut table, ["measured", "predicted", "residual"], main);
+        if let Some(directed) = prediction.per_direction {
+            nrmse.insert("drive_per_direction", nrmse_of(&measured, &directed.predicted));
+            table.set_numbers("predicted_per_direction", directed.predicted);
+        }
+        let summary = DriveSummary {
+            model: "drive",
+            samples: log.len(),
+            simulated_s: span_s(log.drive()?.time_s),
+            nrmse,
+            effects_not_applied: prediction.not_applied,
+        };
+        finish(output, &table, &summary)?;
+        tell(&summary.nrmse);
+        if !summary.effects_not_applied.is_empty() {
+            say(&format!(
+                "effects of the file that are not applied: {}",
+                summary.effects_not_applied.join(", ")
+            ));
+        }
+        say(&format!("written to {}", self.out.display()));
+        Ok(())
+    }
+}
+
+fn span_s(time_s: &[f64]) -> f64 {
+    time_s.last().zip(time_s.first()).map_or(0.0, |(end, start)| end - start)
+}
+
+fn finish(mut output: OutputDir, table: &Log, summary: &impl Serialize) -> Result<(), InputError> {
+    output.write_table("prediction.csv", table)?;
+    output.write_json("summary.json", summary)?;
+    output.finish()
+}
+
+fn tell(nrmse: &BTreeMap<&'static str, Option<f64>>) {
+    for (subsystem, nrmse) in nrmse {
+        match nrmse {
+            Some(nrmse) => say(&format!("{subsystem:9} nrmse {nrmse:.3e}")),
+            None => say(&format!("{subsystem:9} nothing but zero was measured")),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The files of the tool: logs, rigs, models, experiments, and how results are written.
 
+pub mod drive_model;
 pub mod effect_id;
 mod experiment_core;
 pub mod experiment_file;

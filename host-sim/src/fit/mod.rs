@@ -1,7 +1,6 @@
 //! Identification: parameters from logs, with what is known about their uncertainty.
 
 pub mod bounds;
-pub mod contact;
 pub mod covariance;
 pub mod drive;
 pub mod error;

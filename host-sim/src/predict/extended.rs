@@ -24,7 +24,7 @@ const LEAST_DAMPING: f64 = 1e-4;
 const MOST_DAMPING: f64 = 0.99;
 
 /// Whether the model has an effect that changes the friction channel.
-pub(super) fn acts_on_friction(model: &ModelFile) -> bool {
+pub fn acts_on_friction(model: &ModelFile) -> bool {
     model.extensions.iter().any(|extension| Extension::with_id(&extension.id).is_some())
 }
 

@@ -11,15 +11,17 @@
 mod bridge;
 pub mod curve;
 mod drive;
+pub mod drive_model;
 mod extended;
 mod friction;
 mod inputs;
 mod normal_force;
+pub mod observed_slip;
 mod second_order;
 
 pub use bridge::BridgeModel;
 pub use drive::predict_drive;
-pub use extended::effects_elsewhere;
+pub use extended::{acts_on_friction, effects_elsewhere};
 pub use friction::{
     Accuracy, StepPlan, drive_contact, simulate_friction, simulate_friction_as, simulate_planned,
 };

@@ -170,7 +170,8 @@ pub fn position_noise(position: &[f64]) -> f64 {
     white.max(rounding)
 }
 
-fn prepare(record: &DriveRecord, friction: Friction) -> Prepared {
+/// `added` is an effort over the speed, the last column.
+fn prepare(record: &DriveRecord, friction: Friction, added: Option<&dyn Fn(f64) -> f64>) -> Prepared {
     let motion = Kinematics::new(record, CUTOFF_HZ);
     let border = (BORDER_S / record.step_s).round() as usize;
     let inside = border.min(record.len() / 4)..record.len() - border.min(record.len() / 4);
@@ -178,7 +179,7 @@ fn prepare(record: &DriveRecord, friction: Friction) -> Prepared {
     let effort = &record.effort[inside.clone()];
     let each = |f: &dyn Fn(f64) -> f64| speed.iter().map(|v| f(*v)).collect::<Vec<f64>>();
     let (forward, backward) = (|v: f64| f64::from(v > 0.0), |v: f64| f64::from(v < 0.0));
-    let raw: Vec<Vec<f64>> = match friction {
+    let mut raw: Vec<Vec<f64>> = match friction {
         Friction::Symmetric => {
             vec![acceleration.to_vec(), speed.to_vec(), each(&|v| forward(v) - backward(v)), each(&|_| 1.0)]
         }
@@ -190,6 +191,7 @@ fn prepare(record: &DriveRecord, friction: Friction) -> Prepared {
             each(&|v| -backward(v)),
         ],
     };
+    raw.extend(added.map(each));
     let decimator = Decimator::new((record.rate_hz() / DECIMATED_HZ).round() as usize);
     let positions = decimator.positions(speed.len());
     let window = (0.5 * record.rate_hz() / DECIMATED_HZ).ceil() as usize;
@@ -213,7 +215,7 @@ fn prepare(record: &DriveRecord, friction: Friction) -> Prepared {
 /// Identifies a drive from records of the same motion.
 pub fn identify(records: &[DriveRecord], friction: Friction, motion: Motion) -> Result<DriveFit, FitError> {
     let names = friction.names(motion);
-    let prepared: Vec<Prepared> = records.iter().map(|record| prepare(record, friction)).collect();
+    let prepared: Vec<Prepared> = records.iter().map(|record| prepare(record, friction, None)).collect();
     let samples: usize = prepared.iter().map(|p| p.effort.len()).sum();
     let needed = 10 * names.len();
     if samples < needed {
@@ -265,6 +267,27 @@ pub fn identify(records: &[DriveRecord], friction: Friction, motion: Motion) -> 
         relative_force_error: residual.norm() / effort.norm(),
         comparisons,
     })
+}
+
+/// What a drive with these values, in the order of [`Friction::names`], asks for where it moves as recorded; `added` is a
+/// further effort over its speed.
+///
+/// # Errors
+/// A record too short for the filters, or without motion.
+pub fn predict(
+    record: &DriveRecord,
+    friction: Friction,
+    values: &[f64],
+    added: &dyn Fn(f64) -> f64,
+) -> Result<Comparison, FitError> {
+    let Prepared { time_s, effort: measured, columns } = prepare(record, friction, Some(added));
+    if measured.is_empty() {
+        return Err(FitError::TooFewSamples { samples: 0, needed: 1 });
+    }
+    let factors = || values.iter().copied().chain([1.0]);
+    let predicted =
+        (0..measured.len()).map(|i| columns.iter().zip(factors()).map(|(c, x)| x * c[i]).sum()).collect();
+    Ok(Comparison { time_s, measured, predicted })
 }
 
 #[cfg(test)]

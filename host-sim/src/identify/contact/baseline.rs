@@ -28,6 +28,7 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             a2_s_per_m: 0.0,
             stiffness_n_per_m: get("c_n_per_m"),
             damping_n_s_per_m: 0.0,
+            bristles_n_per_m: f64::INFINITY,
             late_ms: 0.0,
         }
     } else {
@@ -39,6 +40,7 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             a2_s_per_m: get("a2_s_per_m"),
             stiffness_n_per_m: if block { get("k_u_n_per_m") } else { get("sigma0_n_per_m") },
             damping_n_s_per_m: if block { get("c_u_n_s_per_m") } else { get("sigma1_n_s_per_m") },
+            bristles_n_per_m: if block { get("sigma0_n_per_m") } else { f64::INFINITY },
             late_ms: 0.0,
         }
     };

@@ -92,6 +92,8 @@ pub struct Contact {
     pub stiffness_n_per_m: f64,
     /// Its damping, N s/m.
     pub damping_n_s_per_m: f64,
+    /// Stiffness of bristles in series with it, N/m; infinite where they are the stiffness itself.
+    pub bristles_n_per_m: f64,
     /// Maxwell branches beside it: stiffness, N/m, and relaxation time, s.
     pub branches: [(f64, f64); 3],
     /// Friction per slip speed: per load, s/m, and whatever the load, N s/m.

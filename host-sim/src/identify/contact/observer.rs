@@ -142,11 +142,13 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     }
     let block = Block::new(contact, dt);
     let (k, c) = (contact.stiffness_n_per_m, contact.damping_n_s_per_m);
+    // While the tip sticks the bristles take their share of the root's way.
+    let share = 1.0 / (1.0 + k / contact.bristles_n_per_m);
     let force = drive.force_n;
     let mut start = SVector::<f64, 4>::zeros();
     start[0] = force[0] / k;
 
-    // First the slip speeds, then, smoothed over three samples, the law.
+    // First the slip speeds, each the mean between two samples; then, at the samples, the law.
     let mut state = start;
     for i in 1..n {
         let before = state[0];
@@ -154,9 +156,9 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         out.sliding[i] = (drive.root_m[i] - drive.root_m[i - 1]) / dt - (state[0] - before) / dt;
     }
     for i in 1..n {
-        let next = if i + 1 < n { out.sliding[i + 1] } else { out.sliding[i] };
-        let last = if i > 1 { out.sliding[i - 1] } else { out.sliding[i] };
-        out.slip_m_s[i] = 0.25 * last + 0.5 * out.sliding[i] + 0.25 * next;
+        // Even about the sample: means before and after it, so that the law is not late by half a step.
+        let at = |i: usize| out.sliding[i.clamp(1, n - 1)];
+        out.slip_m_s[i] = 0.5 * (at(i) + at(i + 1));
     }
 
     let (per_log, log_slowest) = Curve::scale_of_table();
@@ -172,7 +174,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     out.force_n[0] = force[0];
     for i in 1..n {
         block.step(&mut observed, force[i - 1], force[i]);
-        let v = (drive.root_m[i] - drive.root_m[i - 1]) / dt;
+        let way = drive.root_m[i] - drive.root_m[i - 1];
+        let v = 0.5 * (way + drive.root_m[(i + 1).min(n - 1)] - drive.root_m[i.min(n - 2)]) / dt;
         let w = out.slip_m_s[i];
         let speed = w.abs();
         let load = drive.load_n[i];
@@ -200,8 +203,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             0.0
         };
         if slips < 1.0 - 1e-9 {
-            let moved = v * dt;
-            let mut sticking = k * (held[0] + moved) + c * v;
+            let moved = share * way;
+            let mut sticking = k * (held[0] + moved) + c * share * v;
             for b in 0..3 {
                 sticking += contact.branches[b].0 * (held[1 + b] + moved) * branch[b];
             }

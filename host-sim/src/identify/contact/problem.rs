@@ -47,6 +47,8 @@ pub enum Role {
     Stiffness,
     /// Its damping.
     Damping,
+    /// Factor on all friction: of A0 and A1, after them.
+    Factor,
     /// How late the channel is, ms; not a logarithm.
     Late,
 }
@@ -68,6 +70,8 @@ pub struct Numbers {
     pub stiffness_n_per_m: f64,
     /// Its damping, N s/m.
     pub damping_n_s_per_m: f64,
+    /// Stiffness of bristles in series with a block, N/m; infinite where there is no block.
+    pub bristles_n_per_m: f64,
     /// Lateness of the channel beyond the rig file's, ms.
     pub late_ms: f64,
 }
@@ -94,9 +98,8 @@ impl Baseline {
     /// Numbers for fitted values.
     pub fn numbers(&self, p: &[f64]) -> Numbers {
         let mut numbers = self.numbers;
-        for (base, &value) in self.free.iter().zip(p) {
-            let q = &base.parameter;
-            let value = q.mean + BOUND * q.sd * ((value - q.mean) / (BOUND * q.sd)).tanh();
+        for (at, base) in self.free.iter().enumerate() {
+            let value = self.bounded(p, at);
             let slot = match base.role {
                 Role::A0 => &mut numbers.a0,
                 Role::A1 => &mut numbers.a1,
@@ -105,6 +108,11 @@ impl Baseline {
                 Role::A2 => &mut numbers.a2_s_per_m,
                 Role::Stiffness => &mut numbers.stiffness_n_per_m,
                 Role::Damping => &mut numbers.damping_n_s_per_m,
+                Role::Factor => {
+                    numbers.a0 *= value.exp();
+                    numbers.a1 *= value.exp();
+                    continue;
+                }
                 Role::Late => {
                     numbers.late_ms = value;
                     continue;
@@ -113,6 +121,12 @@ impl Baseline {
             *slot = value.exp();
         }
         numbers
+    }
+
+    /// A fitted value within its bounds.
+    pub fn bounded(&self, p: &[f64], at: usize) -> f64 {
+        let q = &self.free[at].parameter;
+        q.mean + BOUND * q.sd * ((p[at] - q.mean) / (BOUND * q.sd)).tanh()
     }
 }
 
@@ -194,6 +208,7 @@ impl<'a> Problem<'a> {
             curve,
             stiffness_n_per_m: k,
             damping_n_s_per_m: c,
+            bristles_n_per_m: n.bristles_n_per_m,
             branches: change.branches,
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,

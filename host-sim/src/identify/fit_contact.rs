@@ -1,0 +1,416 @@
+//! `rig fit` for contact logs: the contact's likelihood with no effect beside the baseline.
+//!
+//! The friction law is evaluated at the slip that is observed from the measured force
+//! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
+//! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it;
+//! then the noise's sources are fitted to what is left, and the parameters again.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::contact::log::ContactLog;
+use super::contact::problem::{Baseline, Fit, Problem, Role};
+use super::fit_interval::covariance;
+use super::fit_parameters::{baseline_of, log_derivatives, values};
+use super::fit_posterior::{points, quantile, spread};
+use crate::files::log::Log;
+use crate::files::model_file::{Interval, ModelFile};
+use crate::files::rig_file::RigFile;
+use crate::fit::covariance::{INTERVAL_95, correlations};
+use crate::fit::error::FitError;
+use crate::fit::identifiability::{Identifiability, examine};
+use crate::input_error::InputError;
+
+/// Gauss–Newton steps for each set of slopes.
+const STEPS: usize = 4;
+/// Sets of slopes at most.
+const ROUNDS: usize = 12;
+/// Converged where −ln of the posterior falls by less: a hundredth of what one standard deviation costs.
+const CONVERGED: f64 = 5e-3;
+/// Rounds of each start before the best goes on.
+const FIRST_ROUNDS: usize = 5;
+/// Starts agree where −ln of the posterior differs by less.
+const SAME_OPTIMUM: f64 = 2.0;
+/// Around the file's numbers the search is started at these ln of factors on v0, stiffness and damping too.
+const SPREAD: [[f64; 3]; 4] = [[0.8, 0.5, 0.7], [0.8, -0.5, -0.7], [-0.8, 0.5, -0.7], [-0.8, -0.5, 0.7]];
+/// A parameter whose 95 % interval is wider than a factor of e either way is not determined: its prior says as much.
+const UNDETERMINED: f64 = 1.0;
+/// The likelihood's own covariance is taken under a prior so many times wider, so that it has an inverse.
+const WIDER: f64 = 1e3;
+/// On the bound from here: of three deviations the bound's slope leaves a tenth.
+const ON_BOUND: f64 = 0.95;
+/// Fewest samples for a parameter.
+const SAMPLES_PER_PARAMETER: usize = 10;
+
+/// An identified contact.
+#[derive(Debug, Clone)]
+pub struct ContactFit {
+    /// The model; intervals of what is determined.
+    pub model: ModelFile,
+    /// Names of the free parameters.
+    pub names: Vec<String>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub std: Vec<f64>,
+    /// Ends of their 95 % intervals, even in the logarithm; `None` where these logs do not determine them.
+    pub ends: Vec<Option<(f64, f64)>>,
+    /// Their correlations.
+    pub correlations: DMatrix<f64>,
+    /// How much later than the rig file says the friction channel is, ms.
+    pub late_ms: f64,
+    /// Smallest over largest singular value of the scaled Jacobian.
+    pub singular_ratio: f64,
+    /// Parameters that ended on a bound.
+    pub on_bound: Vec<String>,
+    /// Starts that ended at the same optimum.
+    pub starts_agreeing: usize,
+    /// RMS error over RMS of the friction torque, by the observed slip, over all logs.
+    pub nrmse_by_observed_slip: f64,
+}
+
+impl ContactFit {
+    /// Names of what these logs do not determine.
+    pub fn undetermined(&self) -> Vec<&str> {
+        self.names.iter().zip(&self.ends).filter(|(_, e)| e.is_none()).map(|(n, _)| n.as_str()).collect()
+    }
+}
+
+/// Whether each free parameter changes what the channel shows, and by its own.
+fn examined(problem: &Problem<'_>, p: &[f64], r: &[f64]) -> Result<f64, FitError> {
+    let columns = problem.jacobian(&[], p, r);
+    let free: Vec<usize> = (0..p.len()).filter(|i| problem.baseline.free[*i].role != Role::Late).collect();
+    let named = |at: Vec<usize>| -> Vec<String> {
+        at.into_iter().map(|i| problem.baseline.free[free[i]].parameter.name.clone()).collect()
+    };
+    match examine(&DMatrix::from_fn(r.len(), free.len(), |t, i| columns[free[i]][t])) {
+        Identifiability::Full { singular_ratio } => Ok(singular_ratio),
+        Identifiability::NoInfluence(at) => Err(FitError::NoInfluence { names: named(at) }),
+        Identifiability::Inseparable { parameters, singular_ratio } => {
+            Err(FitError::Inseparable { names: named(parameters), singular_ratio })
+        }
+    }
+}
+
+fn starts(baseline: &Baseline) -> Vec<Vec<f64>> {
+    let file: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+    let moved = SPREAD.iter().map(|factors| {
+        let off = |role: Role| match role {
+            Role::V0 => factors[0],
+            Role::Stiffness => factors[1],
+            Role::Damping => factors[2],
+            _ => 0.0,
+        };
+        baseline.free.iter().zip(&file).map(|(base, start)| start + off(base.role)).collect()
+    });
+    std::iter::once(file.clone()).chain(moved).collect()
+}
+
+/// Gauss–Newton with fresh slopes until it gains nothing.
+fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, told: &(dyn Fn() + Sync)) -> Fit {
+    let mut best = problem.fit(&[], start, STEPS, None);
+    for _ in 1..rounds {
+        told();
+        let next = problem.fit(&[], best.p.clone(), STEPS, None);
+        let gained = best.cost - next.cost;
+        best = next;
+        if gained < CONVERGED {
+            break;
+        }
+    }
+    best
+}
+
+/// Identifies the parameters `free` of `model` from logs. `told` hears of every round of the search.
+///
+/// # Errors
+/// Logs without the columns; parameters that are unknown, that these logs do not show, or that they cannot part.
+pub fn identify(
+    model: &ModelFile,
+    rig: &RigFile,
+    logs: &[Log],
+    free: &[String],
+    told: &(dyn Fn() + Sync),
+) -> Result<ContactFit, InputError> {
+    let refuse = |why: FitError| InputError::new(why.to_string()).file(model.source.as_str());
+    let baseline = baseline_of(model, free)?;
+    let logs = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+    let samples = logs.iter().flat_map(|log| &log.usable).filter(|used| **used).count();
+    let needed = SAMPLES_PER_PARAMETER * baseline.free.len();
+    if samples < needed {
+        return Err(refuse(FitError::TooFewSamples { samples, needed }));
+    }
+    let mut problem = Problem::new(&logs, &baseline, &[]);
+    let starts = starts(&baseline);
+    examined(&problem, &starts[0], &problem.residuals(&[], &starts[0])).map_err(refuse)?;
+
+    let mut found: Vec<Fit> =
+        starts.into_par_iter().map(|start| converged(&problem, start, FIRST_ROUNDS, told)).collect();
+    found.retain(|fit| fit.cost.is_finite());
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Some(best) = found.first() else { return Err(refuse(FitError::NotFinite)) };
+    let starts_agreeing = found.iter().filter(|fit| fit.cost < best.cost + SAME_OPTIMUM).count();
+
+    // The noise model begins with slopes and transitions of the numbers found, not of the file's.
+    let mut there = baseline.clone();
+    there.free.iter_mut().zip(&best.p).for_each(|(base, p)| base.parameter.mean = *p);
+    problem.noise = Problem::new(&logs, &there, &[]).noise;
+    let mut fit = converged(&problem, best.p.clone(), ROUNDS, told);
+    for _ in 0..2 {
+        problem.noise.refit(&logs, &fit.r);
+        fit = converged(&problem, fit.p.clone(), ROUNDS, told);
+    }
+    let singular_ratio = examined(&problem, &fit.p, &fit.r).map_err(refuse)?;
+
+    let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
+    let prediction = problem.predict(&[], &fit.p);
+    let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
+    let columns = problem.jacobian(&[], &fit.p, &fit.r);
+    let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
+    let slid = prediction.observed.iter().flat_map(|o| {
+        o.slip_m_s
+            .iter()
+            .zip(&o.sliding)
+            .filter(|(_, s)| **s > 0.5)
+            .map(|(w, _)| w.abs())
+            .filter(|w| *w > 0.0)
+    });
+    let of_p = covariance(&columns, &fit.r, &lengths, &alone);
+    let points = points(&baseline, &fit.p, &of_p, slid.collect());
+    let values = values(model, &baseline, &fit.p, free);
+    let uncertain = match &points {
+        Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),
+        None => {
+            let of_p = covariance(&columns, &fit.r, &lengths, &prior_sd);
+            let to_log = log_derivatives(model, &baseline, &fit.p, free);
+            Uncertain::about(&values, &(&to_log * of_p * to_log.transpose()))
+        }
+    };
+    let Uncertain { std, ends, correlations } = uncertain;
+    let mut fitted = model.clone();
+    set_all(&mut fitted, free, &values)?;
+    for (i, name) in free.iter().enumerate() {
+        match ends[i] {
+            Some((low, high)) => {
+                fitted.intervals.insert(name.clone(), Interval { std: std[i], low, high });
+            }
+            None => {
+                fitted.intervals.remove(name);
+            }
+        }
+    }
+    let on_bound = baseline
+        .free
+        .iter()
+        .zip(&fit.p)
+        .filter(|(base, p)| ((*p - base.parameter.mean) / (3.0 * base.parameter.sd)).tanh().abs() > ON_BOUND)
+        .map(|(base, _)| base.parameter.name.clone())
+        .collect();
+    let (error, signal) = problem
+        .measured()
+        .zip(&prediction.shown_nm)
+        .fold((0.0, 0.0), |(error, signal), (y, x)| (error + (y - x) * (y - x), signal + y * y));
+    let late = baseline.free.iter().position(|base| base.role == Role::Late);
+    Ok(ContactFit {
+        model: fitted,
+        names: free.to_vec(),
+        values,
+        std,
+        ends,
+        correlations,
+        late_ms: late.map_or(0.0, |at| baseline.bounded(&fit.p, at)),
+        singular_ratio,
+        on_bound,
+        starts_agreeing,
+        nrmse_by_observed_slip: (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt(),
+    })
+}
+
+/// What is known of the file's parameters.
+struct Uncertain {
+    std: Vec<f64>,
+    ends: Vec<Option<(f64, f64)>>,
+    correlations: DMatrix<f64>,
+}
+
+/// Ends of an interval, where it is narrow enough to say something.
+fn determined(low: f64, high: f64) -> Option<(f64, f64)> {
+    ((high / low).ln() < 2.0 * UNDETERMINED).then_some((low, high))
+}
+
+impl Uncertain {
+    /// From the covariance of logarithms.
+    fn about(values: &[f64], of_log: &DMatrix<f64>) -> Self {
+        let relative = |i: usize| of_log[(i, i)].max(0.0).sqrt();
+        let ends = |i: usize| {
+            let factor = (INTERVAL_95 * relative(i)).exp();
+            determined(values[i] / factor, values[i] * factor)
+        };
+        Self {
+            std: (0..values.len()).map(|i| values[i] * relative(i)).collect(),
+            ends: (0..values.len()).map(ends).collect(),
+            correlations: correlations(of_log),
+        }
+    }
+
+    /// From points of the posterior.
+    fn of_points(
+        model: &ModelFile,
+        baseline: &Baseline,
+        free: &[String],
+        values: &[f64],
+        points: &[Vec<f64>],
+    ) -> Self {
+        let logs: Vec<Vec<f64>> = points
+            .iter()
+            .map(|p| self::values(model, baseline, p, free).into_iter().map(f64::ln).collect())
+            .collect();
+        let of_log = spread(&logs);
+        let (mut std, mut ends) = (Vec::new(), Vec::new());
+        for (i, value) in values.iter().enumerate() {
+            let mut own: Vec<f64> = logs.iter().map(|x| x[i]).collect();
+            // Quantiles of the normal's 95 %, widened as Student's t asks for the blocks' count.
+            let widened = |x: f64| value.ln() + (x - value.ln()) * INTERVAL_95 / 1.96;
+            let low = widened(quantile(&mut own, 0.025)).exp().min(*value);
+            let high = widened(quantile(&mut own, 0.975)).exp().max(*value);
+            std.push(value * of_log[(i, i)].sqrt());
+            ends.push(determined(low, high));
+        }
+        Self { std, ends, correlations: correlations(&of_log) }
+    }
+}
+
+/// Sets the file's numbers, whichever way they bound each other.
+fn set_all(model: &mut ModelFile, names: &[String], values: &[f64]) -> Result<(), InputError> {
+    let set = |model: &mut ModelFile| {
+        names.iter().zip(values).map(|(name, value)| model.set(name, *value)).fold(Ok(()), Result::and)
+    };
+    // Kinetic friction may have to wait for static friction to be raised, in the first round.
+    set(model).or_else(|_| set(model))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::model_file::ModelKind;
+    use crate::files::signal::Signal;
+    use crate::identify::fit_parameters::default_free;
+    use crate::predict::{ContactInputs, simulate_friction};
+
+    /// A log of a known element: reversals at several speeds and loads, or steady sliding; noise on all channels.
+    fn log(model: &ModelFile, rig: &RigFile, sticking: bool, seed: u64) -> Log {
+        let mut seed = seed;
+        let mut noise = |size: f64| {
+            let mut sum = 0.0;
+            for _ in 0..12 {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                sum += (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            }
+            size * sum
+        };
+        let time: Vec<f64> = (0..8000).map(|i| 1e-3 * f64::from(i)).collect();
+        let speed: Vec<f64> = time
+            .iter()
+            .map(|t| {
+                if sticking { (8.0 * (1.3 * t).sin() + 4.0 * (3.1 * t).sin()).clamp(-9.0, 9.0) } else { 9.0 }
+            })
+            .collect();
+        let load: Vec<f64> = time.iter().map(|t| 70.0 + 25.0 * (0.7 * t).sin()).collect();
+        let mut clean = Log::default();
+        clean.set_signal(Signal::Time, time);
+        clean.set_signal(Signal::M2Speed, speed.clone());
+        clean.set_signal(Signal::NormalForce, load.clone());
+        clean.set_signal(Signal::FrictionTorque, vec![0.0; speed.len()]);
+        let torque =
+            simulate_friction(model, rig, &ContactInputs::new(&clean.contact().unwrap(), rig)).unwrap();
+        let mut shown = clean;
+        shown.set_signal(Signal::M2Speed, speed.iter().map(|v| v + noise(0.01)).collect());
+        shown.set_signal(Signal::NormalForce, load.iter().map(|n| n + noise(0.3)).collect());
+        shown.set_signal(Signal::FrictionTorque, torque.iter().map(|t| t + noise(0.02)).collect());
+        shown
+    }
+
+    fn model(kind: ModelKind, numbers: &[(&str, f64)]) -> ModelFile {
+        ModelFile::new("model", kind, numbers).unwrap()
+    }
+
+    fn lugre() -> ModelFile {
+        model(ModelKind::Lugre, &[("sigma0_n_per_m", 3e4), ("a0", 0.6), ("a1", 0.4), ("v0_m_s", 0.1)])
+    }
+
+    fn fitted(truth: &ModelFile, guess: &ModelFile, sticking: bool) -> Result<ContactFit, InputError> {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [log(truth, &rig, sticking, 1), log(truth, &rig, sticking, 2)];
+        identify(guess, &rig, &logs, &default_free(guess), &|| ())
+    }
+
+    #[test]
+    fn a_series_element_is_found_from_a_start_that_is_off_by_a_third() {
+        let numbers = |k: f64, c: f64, a0: f64, a1: f64, v0: f64| {
+            model(
+                ModelKind::Series,
+                &[
+                    ("sigma0_n_per_m", 1.5e7),
+                    ("k_u_n_per_m", k),
+                    ("c_u_n_s_per_m", c),
+                    ("a0", a0),
+                    ("a1", a1),
+                    ("v0_m_s", v0),
+                ],
+            )
+        };
+        let truth = numbers(3e4, 160.0, 0.5, 0.6, 0.4);
+        let fit = fitted(&truth, &numbers(2e4, 100.0, 0.65, 0.42, 0.52), true).unwrap();
+        for (name, found) in fit.names.iter().zip(&fit.values) {
+            let value = truth.get(name).unwrap();
+            // Noise of 0.5 % of the friction on 16 000 samples, few of them in stick.
+            assert!((found / value - 1.0).abs() < 0.05, "{name}: {found} for {value}");
+            assert!(fit.model.intervals[name].std < 0.05 * value, "{name}");
+        }
+        assert!(fit.nrmse_by_observed_slip < 0.02, "{}", fit.nrmse_by_observed_slip);
+    }
+
+    #[test]
+    fn a_lugre_element_is_identified_whatever_the_file_says_of_its_bristles() {
+        let guess =
+            model(ModelKind::Lugre, &[("sigma0_n_per_m", 2e5), ("a0", 0.9), ("a1", 0.2), ("v0_m_s", 0.5)]);
+        let fit = fitted(&lugre(), &guess, true).unwrap();
+        for (name, found) in fit.names.iter().zip(&fit.values) {
+            let value = lugre().get(name).unwrap();
+            assert!((found / value - 1.0).abs() < 0.06, "{name}: {found} for {value}");
+        }
+    }
+
+    #[test]
+    fn steady_sliding_does_not_determine_the_bristles_and_says_so() {
+        match fitted(&lugre(), &lugre(), false) {
+            Err(error) => assert!(error.to_string().contains("cannot be"), "{error}"),
+            Ok(fit) => {
+                assert!(fit.undetermined().contains(&"sigma0_n_per_m"), "{:?} {:?}", fit.values, fit.std);
+                assert!(!fit.model.intervals.contains_key("sigma0_n_per_m"));
+            }
+        }
+    }
+
+    #[test]
+    fn theta_and_the_coefficients_that_it_scales_are_refused_together() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [log(&lugre(), &rig, true, 4)];
+        let free: Vec<String> = ["theta", "a0", "a1", "v0_m_s"].map(String::from).to_vec();
+        let error = identify(&lugre(), &rig, &logs, &free, &|| ()).unwrap_err().to_string();
+        for name in ["theta", "a0", "a1", "cannot be told apart"] {
+            assert!(error.contains(name), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_the_balance_does_not_show_is_refused_by_name() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [log(&lugre(), &rig, true, 4)];
+        let series = ModelFile::assumed(&[]).unwrap();
+        let refused =
+            |name: &str| identify(&series, &rig, &logs, &[name.to_string()], &|| ()).unwrap_err().to_string();
+        assert!(refused("sigma0_n_per_m").contains("sigma0_n_per_m cannot be identified"));
+        assert!(refused("stiffness").contains("stiffness: unknown parameter; allowed: sigma0_n_per_m"));
+    }
+}
