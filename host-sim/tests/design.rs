@@ -6,11 +6,11 @@
 
 use host_sim::design::separation::Reach;
 use host_sim::design::{self, Effort, Proposal};
-use host_sim::diagnose::noise;
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
 use host_sim::files::signal::Signal;
+use host_sim::identify::noise;
 use host_sim::lockstep::{self, Setup};
 use host_sim::predict::ContactInputs;
 

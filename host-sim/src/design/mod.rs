@@ -10,11 +10,11 @@ pub mod text;
 
 use rayon::prelude::*;
 
-use crate::diagnose::noise;
 use crate::files::experiment_file::ExperimentFile;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
+use crate::identify::noise;
 use crate::input_error::InputError;
 use crate::lockstep::{self, Setup};
 use crate::predict::ContactInputs;

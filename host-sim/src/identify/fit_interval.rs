@@ -26,7 +26,12 @@ fn blocks(lengths: &[usize]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Covariance of parameters whose prior is `prior_sd`, from the columns −∂r/∂p and the residuals over their deviations.
-pub fn covariance(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> DMatrix<f64> {
+pub(super) fn covariance(
+    columns: &[Vec<f64>],
+    r: &[f64],
+    lengths: &[usize],
+    prior_sd: &[f64],
+) -> DMatrix<f64> {
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let slope: Vec<f64> = r

@@ -265,7 +265,8 @@ pub fn judge(
             .allowed("contact logs, or drive logs"));
     }
     let mut notes = Vec::new();
-    let (mut contact, mut drive, mut press) = (None, None, None);
+    let (mut contact, mut press) = (None, None);
+    let mut drive;
     let linear_stage = kinds.first() == Some(&LogKind::LinearDrive);
     if kinds.first() == Some(&LogKind::Contact) {
         let mut logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;

@@ -13,7 +13,7 @@
 //! friction), while the encoder's noise after the low-pass is small against acceleration and speed, so
 //! the bias by noise in the regressors is small. Samples at rest, where friction is a reaction and not
 //! a function of speed, are left out.
-//! Left out: everything in [`crate::diagnose::drive`].
+//! Left out: what [`crate::identify`] finds in a drive beside these.
 
 use nalgebra::{DMatrix, DVector};
 

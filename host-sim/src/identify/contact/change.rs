@@ -68,10 +68,13 @@ pub struct ContactTerm {
     /// Whether it is a law that can be exported: a law instead of columns.
     pub law: bool,
     /// What it changes.
-    pub act: Box<dyn Fn(&[f64], &mut Change) + Send + Sync>,
+    pub act: Act,
     /// The core's parameters for fitted values; may change the baseline's numbers. `None` where the form is no law.
     pub export: Option<Export>,
 }
+
+/// Puts fitted values into a change.
+pub type Act = Box<dyn Fn(&[f64], &mut Change) + Send + Sync>;
 
 /// From fitted values to the core's parameters, names with units.
 pub type Export = Box<dyn Fn(&[f64], &mut Numbers) -> Vec<(String, f64)> + Send + Sync>;

@@ -21,7 +21,7 @@ use crate::identify::filters::{gradient, local_maximum};
 use crate::identify::linear;
 
 /// What no model of friction is more accurate than, relative.
-pub const MODEL_FORM: f64 = 0.004;
+pub(crate) const MODEL_FORM: f64 = 0.004;
 /// Share of a change within a sample that is not known: about 1/√12, the deviation of an even distribution.
 const BETWEEN_SAMPLES: f64 = 0.3;
 /// Error near a transition between slip and stick, relative to the load.
@@ -176,7 +176,7 @@ impl Noise {
 
 /// Mean spectral density below [`SLOW_HZ`] over that of all frequencies: from the variance of means over blocks of half a
 /// period of that frequency, which is its spectral window.
-pub fn slow_share(values: &[f64], step_s: f64) -> f64 {
+pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
     let block = (0.5 / (SLOW_HZ * step_s)).round().max(1.0) as usize;
     let all = values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
     let (mut sum, mut count) = (0.0, 0);

@@ -4,7 +4,7 @@
 //! ([`super::noise`]), a share 1/T of the samples counted as independent. Normal priors on all parameters; those of the
 //! baseline are bounded smoothly at three deviations, so that nothing else can hide in them.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::change::{Change, ContactTerm};

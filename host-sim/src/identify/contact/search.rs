@@ -22,6 +22,9 @@ pub struct Ranked {
     pub fit: Fit,
 }
 
+/// Values of a term's parameters at several points.
+type Points = Vec<Vec<f64>>;
+
 /// Sets from which a larger one is looked for.
 const PARENTS: usize = 5;
 /// Larger sets refitted, of those that the tables rank.
@@ -136,22 +139,6 @@ fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
 fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]) -> Vec<Fit> {
     for &(keep, iterations) in rounds {
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        if std::env::var("STAGES").is_ok() {
-            eprintln!(
-                "stage {keep} {iterations}: {:?}",
-                fits.iter()
-                    .map(|f| format!(
-                        "{} {:.0}",
-                        f.terms
-                            .iter()
-                            .map(|t| format!("{}/{}", problem.terms[*t].effect, problem.terms[*t].form))
-                            .collect::<Vec<_>>()
-                            .join("+"),
-                        f.cost
-                    ))
-                    .collect::<Vec<_>>()
-            );
-        }
         fits.truncate(keep);
         fits = fits.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, iterations, None)).collect();
     }
@@ -159,7 +146,7 @@ fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]
 }
 
 /// The best single terms, and for each nonlinear one the points where it stood after a few iterations.
-fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Vec<Vec<f64>>>>) {
+fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>) {
     let slopes = problem.slopes(&[], &base.p, &base.r);
     let first = |terms: Vec<usize>| -> Vec<Fit> {
         let starts: Vec<(usize, Vec<f64>)> = terms
@@ -173,7 +160,7 @@ fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Vec<Vec<f
     };
     let forms = (0..problem.terms.len()).filter(|term| !problem.terms[*term].law).collect();
     let tried = first(forms);
-    let mut known: Vec<Option<Vec<Vec<f64>>>> = vec![None; problem.terms.len()];
+    let mut known: Vec<Option<Points>> = vec![None; problem.terms.len()];
     for fit in &tried {
         let term = &problem.terms[fit.terms[0]];
         if !term.parameters.iter().all(|p| p.amplitude) {
@@ -231,7 +218,7 @@ fn table(
     problem: &Problem<'_>,
     parent: &Fit,
     slopes: &Slopes,
-    known: &[Option<Vec<Vec<f64>>>],
+    known: &[Option<Points>],
 ) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
     let w = problem.weights(&parent.r);
@@ -240,7 +227,7 @@ fn table(
         .filter(|t| !problem.terms[*t].law && !has(problem.terms[*t].effect))
         .collect();
     // Columns of each other term, and the points that they stand for where it is not linear.
-    let blocks: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> = others
+    let blocks: Vec<(Vec<Vec<f64>>, Points)> = others
         .par_iter()
         .map(|&term| {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
@@ -315,7 +302,7 @@ fn table(
     out
 }
 
-fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Vec<Vec<f64>>>]) -> Vec<Fit> {
+fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
     let mut candidates: Vec<(f64, Vec<usize>, Vec<Vec<f64>>)> = Vec::new();
     for parent in parents {
         let level = problem.log_evidence(parent);

@@ -13,7 +13,7 @@ const LEAST_SHARE: f64 = 0.004;
 const EDGE_NOISES: f64 = 2.5;
 
 /// The end at which samples pile up: more of them in the last band of values than in the next one below, thrice over.
-fn end(values: &mut Vec<f64>, noise: f64) -> Option<f64> {
+fn end(values: &mut [f64], noise: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();
     let band = 2.0 * EDGE_NOISES * noise;
