@@ -15,13 +15,17 @@
 pub mod brush;
 pub mod brush_patch;
 mod contact;
+pub mod element;
 pub mod lugre;
 pub mod lugre_patch;
-mod model;
 pub mod modified_lugre;
+mod parameters;
+pub mod registry;
 pub mod series;
 pub mod static_curve;
 pub mod stribeck;
 
 pub use contact::{Contact, FrictionForce};
-pub use model::{FrictionModel, FrictionState};
+pub use element::{Element, MOST_PARAMETERS, ParameterSpec};
+pub use parameters::FrictionParameters;
+pub use registry::{FrictionModel, FrictionState, ModelKind};

@@ -13,7 +13,9 @@
 //! step; it is a property of that integrator, not of the model.
 
 use super::contact::{Contact, FrictionForce};
-use super::lugre::{LugreParameters, require_step};
+use super::element::{Element, ParameterSpec};
+use super::lugre::{self, LugreParameters, require_step};
+use super::registry::FrictionModel;
 use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -59,7 +61,7 @@ impl<T: Real> ModifiedLugre<T> {
     /// Parameters for which the implicit equation could have several roots are refused under the
     /// name `a0`.
     pub fn new(p: &LugreParameters<T>, step_s: T) -> Result<Self, ParameterError> {
-        let lugre = super::lugre::Lugre::new(p, step_s)?;
+        let lugre = lugre::Lugre::new(p, step_s)?;
         let one_root = lugre.stribeck.momentum_rises();
         require("a0", p.stribeck.a0, one_root, "a0 > a1 delta exp(-(1 + 1/delta)), else several roots")?;
         let mut model = Self {
@@ -173,5 +175,61 @@ impl<T: Real> ModifiedLugre<T> {
             }
         }
         s.copysign(r)
+    }
+}
+
+impl<T: Real> FrictionModel<T> {
+    /// A modified LuGre element.
+    pub fn modified_lugre(p: &LugreParameters<T>, step_s: T) -> Result<Self, ParameterError> {
+        ModifiedLugre::new(p, step_s).map(Self::ModifiedLugre)
+    }
+}
+
+impl<T: Real> Element<T> for ModifiedLugre<T> {
+    type State = ModifiedLugreState<T>;
+
+    const PARAMETERS: &'static [ParameterSpec] = lugre::PARAMETERS;
+
+    fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {
+        Self::new(&LugreParameters::from_values(values)?, step_s)
+    }
+
+    fn rest(&self) -> ModifiedLugreState<T> {
+        ModifiedLugreState::default()
+    }
+
+    fn holding(&self, force_n: T, contact: &Contact<T>) -> ModifiedLugreState<T> {
+        let most_m = self.largest_deflection_m(contact.load_n());
+        ModifiedLugreState { deflection_m: (force_n * self.inverse_sigma0).within(most_m), rate_m_s: T::ZERO }
+    }
+
+    #[inline]
+    fn set_step_s(&mut self, step_s: T) {
+        self.set_step_s(step_s);
+    }
+
+    #[inline]
+    fn step(&self, state: &mut ModifiedLugreState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+        self.step(state, contact)
+    }
+
+    fn deformation_m(state: &ModifiedLugreState<T>) -> T {
+        state.deflection_m
+    }
+
+    fn largest_coefficient(&self) -> T {
+        self.stribeck.largest()
+    }
+
+    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
+        self.sigma0
+    }
+
+    fn stribeck(&self) -> Option<&Stribeck<T>> {
+        Some(&self.stribeck)
+    }
+
+    fn winding_reach_m(&self, load_n: T) -> Option<T> {
+        Some(self.largest_deflection_m(load_n))
     }
 }

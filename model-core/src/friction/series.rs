@@ -20,7 +20,10 @@
 //! Left out: the mass of the block, and the spread of deformation over its cross-section.
 
 use super::contact::{Contact, FrictionForce};
-use super::lugre::{Lugre, LugreParameters};
+use super::element::{Element, ParameterSpec, exactly};
+use super::lugre::{Lugre, LugreParameters, and_bristles};
+use super::registry::FrictionModel;
+use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
 use crate::real::Real;
 
@@ -307,5 +310,87 @@ impl<T: Real> Series<T> {
             }
         }
         (v, at)
+    }
+}
+
+impl<T: Real> SeriesParameters<T> {
+    /// In the order of [`Element::PARAMETERS`].
+    pub(super) fn values(&self) -> [T; 10] {
+        let [a, b, c, d, e, f, g, h] = self.bristles.values();
+        [a, b, c, d, e, f, g, h, self.k_u_n_per_m, self.c_u_n_s_per_m]
+    }
+
+    /// From as many values in that order.
+    pub(super) fn from_values(values: &[T]) -> Result<Self, ParameterError> {
+        let [bristles @ .., k_u_n_per_m, c_u_n_s_per_m] = exactly::<T, 10>(values)?;
+        let bristles = LugreParameters::from_values(&bristles)?;
+        Ok(Self { k_u_n_per_m, c_u_n_s_per_m, bristles })
+    }
+}
+
+impl<T: Real> FrictionModel<T> {
+    /// A series element.
+    pub fn series(p: &SeriesParameters<T>, step_s: T) -> Result<Self, ParameterError> {
+        Series::new(p, step_s).map(Self::Series)
+    }
+}
+
+impl<T: Real> Element<T> for Series<T> {
+    type State = SeriesState<T>;
+
+    const PARAMETERS: &'static [ParameterSpec] = &and_bristles::<2, 10>([
+        ParameterSpec::required("k_u_n_per_m", 3e4).searched(1e3, 1e6).extensive(),
+        ParameterSpec::required("c_u_n_s_per_m", 160.0).searched(2.0, 1e4).extensive(),
+    ]);
+
+    fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {
+        Self::new(&SeriesParameters::from_values(values)?, step_s)
+    }
+
+    fn rest(&self) -> SeriesState<T> {
+        SeriesState::default()
+    }
+
+    fn holding(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T> {
+        let held = force_n.within(contact.load_n() * self.lugre.stribeck.largest());
+        SeriesState {
+            deformation_m: held / self.k_u,
+            deflection_m: held * self.lugre.inverse_sigma0,
+            tip_speed_m_s: contact.sliding_speed_m_s,
+            mean_tip_speed_m_s: contact.sliding_speed_m_s,
+            mean_root_speed_m_s: contact.sliding_speed_m_s,
+            deflection_rate_m_s: T::ZERO,
+            last_step_s: T::ZERO,
+        }
+    }
+
+    #[inline]
+    fn set_step_s(&mut self, step_s: T) {
+        self.set_step_s(step_s);
+    }
+
+    #[inline]
+    fn step(&self, state: &mut SeriesState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+        self.step(state, contact)
+    }
+
+    fn deformation_m(state: &SeriesState<T>) -> T {
+        state.deformation_m
+    }
+
+    fn largest_coefficient(&self) -> T {
+        self.lugre.stribeck.largest()
+    }
+
+    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
+        self.k_u
+    }
+
+    fn stribeck(&self) -> Option<&Stribeck<T>> {
+        Some(&self.lugre.stribeck)
+    }
+
+    fn block_time_s(&self) -> Option<T> {
+        Some(self.c_u / self.k_u)
     }
 }

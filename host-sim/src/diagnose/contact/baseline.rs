@@ -32,6 +32,7 @@ pub fn other_starts(kind: ModelKind) -> &'static [&'static [(&'static str, f64)]
         ModelKind::Series => &[&[("c_u_n_s_per_m", 2.0)], &[("c_u_n_s_per_m", 4.0), ("k_u_n_per_m", 1.3)]],
         ModelKind::Lugre | ModelKind::ModifiedLugre => &[&[("sigma0_n_per_m", 3e-3)]],
         ModelKind::Brush => &[&[("c_n_per_m", 0.1)]],
+        _ => &[],
     }
 }
 

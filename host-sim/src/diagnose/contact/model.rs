@@ -7,6 +7,9 @@ use crate::files::model_file::{ModelFile, ModelKind};
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 
+/// What the rig presses with at most, about.
+const LARGE_LOAD_N: f64 = 200.0;
+
 /// A baseline with effects, in numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactModel {
@@ -66,14 +69,8 @@ impl ContactModel {
 
     /// Stiffness against small motion (N/m) and the largest friction coefficient.
     pub fn stiffness_and_friction(&self) -> (f64, f64) {
-        let get = |name| self.parameter(name).unwrap_or(0.0);
-        match self.kind {
-            ModelKind::Brush => (get("c_n_per_m"), get("mu_s")),
-            ModelKind::Lugre | ModelKind::ModifiedLugre => {
-                (get("sigma0_n_per_m"), get("theta") * (get("a0") + get("a1")))
-            }
-            ModelKind::Series => (get("k_u_n_per_m"), get("theta") * (get("a0") + get("a1"))),
-        }
+        let friction = self.to_file("the model").and_then(|file| file.friction_model(1e-4));
+        friction.map_or((0.0, 0.0), |f| (f.sticking_stiffness_n_per_m(LARGE_LOAD_N), f.largest_coefficient()))
     }
 
     /// As a model file, without extensions.
