@@ -94,6 +94,11 @@ pub trait Element<T: Real>: Copy + Debug + PartialEq {
     /// Stiffness against a small motion while the element sticks under `load_n`, N/m.
     fn sticking_stiffness_n_per_m(&self, load_n: T) -> T;
 
+    /// What a user should know who runs the model with these parameters.
+    fn warning(&self) -> Option<&'static str> {
+        None
+    }
+
     /// The curve of steady sliding, where it is a Stribeck curve: how finely a motion must be cut depends on it.
     fn stribeck(&self) -> Option<&Stribeck<T>> {
         None

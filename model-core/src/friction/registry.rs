@@ -111,6 +111,11 @@ macro_rules! models {
                 match self { $(Self::$variant(m) => Element::sticking_stiffness_n_per_m(m, load_n),)* }
             }
 
+            /// What a user should know who runs the model with these parameters.
+            pub fn warning(&self) -> Option<&'static str> {
+                match self { $(Self::$variant(m) => Element::warning(m),)* }
+            }
+
             /// The curve of steady sliding, where it is a Stribeck curve.
             pub fn stribeck(&self) -> Option<&Stribeck<T>> {
                 match self { $(Self::$variant(m) => Element::stribeck(m),)* }
@@ -143,6 +148,8 @@ models! {
     Lugre, super::lugre::Lugre<T>, super::lugre::LugreState<T>, "lugre";
     /// Modified LuGre as printed.
     ModifiedLugre, super::modified_lugre::ModifiedLugre<T>, super::modified_lugre::ModifiedLugreState<T>, "modified_lugre";
+    /// Modified LuGre without the condition for one root.
+    ModifiedLugreFold, super::modified_lugre::Folded<T>, super::modified_lugre::ModifiedLugreState<T>, "modified_lugre_fold";
     /// Rubber block in series with LuGre bristles.
     Series, super::series::Series<T>, super::series::SeriesState<T>, "series";
 }
