@@ -13,10 +13,10 @@
 //!
 //! The force needs no damping term: the block is massless, and eq. 4 has none.
 
+use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
 use super::element::{Element, ParameterSpec, exactly};
 use super::lugre::require_step;
-use super::registry::FrictionModel;
 use crate::error::{ParameterError, require};
 use crate::real::Real;
 

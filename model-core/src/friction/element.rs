@@ -1,6 +1,6 @@
 //! What a friction model of one element declares and does: all that the rest of the project needs to know of it.
 //!
-//! A model is one file that implements [`Element`] and one line in [`super::registry`]. Model files, the observer on
+//! A model is one file that implements [`Element`] and one line in the list of [`super`]. Model files, the observer on
 //! the chip, the wire, the plant, fits and the self-check follow from the declaration.
 
 use core::fmt::Debug;

@@ -10,9 +10,9 @@
 //! Left out: wear, temperature and everything else that changes g in time; see
 //! [`Contact::road_factor`]. Without load the bristles spring back at once (z = 0).
 
+use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
 use super::element::{Element, ParameterSpec, exactly};
-use super::registry::FrictionModel;
 use super::stribeck::{Stribeck, StribeckParameters};
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -192,6 +192,14 @@ pub(super) const fn and_bristles<const M: usize, const N: usize>(
         k += 1;
     }
     all
+}
+
+/// The bristles and the `M` values that follow them.
+pub(super) fn bristles_and<T: Real, const M: usize>(
+    values: &[T],
+) -> Result<(LugreParameters<T>, [T; M]), ParameterError> {
+    let (bristles, more) = values.split_at(values.len().min(BRISTLES.len()));
+    Ok((LugreParameters::from_values(bristles)?, exactly(more)?))
 }
 
 impl<T: Real> LugreParameters<T> {

@@ -23,10 +23,10 @@
 //! The paper prints an overshoot. g at the previous step's rate ([`Scheme::Lagged`]) makes one with a coarse step, and a
 //! physical lag of s makes one at any step; which of them the authors had, they do not say.
 
+use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
 use super::element::{Element, ParameterSpec};
 use super::lugre::{self, LugreParameters, require_step};
-use super::registry::FrictionModel;
 use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
 use crate::real::Real;

@@ -6,8 +6,8 @@ use core::fmt::{self, Debug};
 use super::brush::BrushParameters;
 use super::element::MOST_PARAMETERS;
 use super::lugre::{self, LugreParameters};
-use super::registry::{FrictionModel, ModelKind};
 use super::series::SeriesParameters;
+use super::{FrictionModel, ModelKind};
 use crate::error::ParameterError;
 use crate::real::Real;
 

@@ -1,13 +1,9 @@
-//! All friction models of one element: one line each, from which everything else follows.
+//! What follows from the list of friction models in [`super`]: kinds, the models' and states' enums, and their dispatch.
 //!
-//! The line names the variant, the type with its [`Element`] implementation, its state, and the `kind` of a model
+//! A line names the variant, the type with its [`Element`] implementation, its state, and the `kind` of a model
 //! file. A kind is known by its name in files, on the wire and in flash, never by its place in this list.
 
-use super::contact::{Contact, FrictionForce};
-use super::element::{Element, MOST_PARAMETERS, ParameterSpec};
-use super::stribeck::Stribeck;
-use crate::error::ParameterError;
-use crate::real::Real;
+use super::ModelKind;
 
 macro_rules! models {
     ($($(#[doc = $doc:literal])* $variant:ident, $model:path, $state:path, $name:literal;)*) => {
@@ -51,7 +47,7 @@ macro_rules! models {
             }
 
             /// The model from one value for each parameter, prepared for a step size, or the parameter out of range.
-            pub fn build<T: Real>(self, values: &[T], step_s: T) -> Result<FrictionModel<T>, ParameterError> {
+            pub fn build<T: $crate::real::Real>(self, values: &[T], step_s: T) -> Result<FrictionModel<T>, ParameterError> {
                 Ok(match self {
                     $(Self::$variant => FrictionModel::$variant(Element::build(values, step_s)?),)*
                 })
@@ -141,19 +137,6 @@ macro_rules! models {
     };
 }
 
-models! {
-    /// Brush with reset.
-    Brush, super::brush::Brush<T>, super::brush::BrushState<T>, "brush";
-    /// LuGre.
-    Lugre, super::lugre::Lugre<T>, super::lugre::LugreState<T>, "lugre";
-    /// Modified LuGre as printed.
-    ModifiedLugre, super::modified_lugre::ModifiedLugre<T>, super::modified_lugre::ModifiedLugreState<T>, "modified_lugre";
-    /// Modified LuGre without the condition for one root.
-    ModifiedLugreFold, super::modified_lugre::Folded<T>, super::modified_lugre::ModifiedLugreState<T>, "modified_lugre_fold";
-    /// Rubber block in series with LuGre bristles.
-    Series, super::series::Series<T>, super::series::SeriesState<T>, "series";
-}
-
 impl ModelKind {
     /// The kind with a name.
     #[must_use]
@@ -164,7 +147,7 @@ impl ModelKind {
 
 #[cfg(test)]
 mod tests {
-    use super::super::FrictionParameters;
+    use super::super::{Contact, FrictionParameters, MOST_PARAMETERS};
     use super::*;
 
     #[test]
