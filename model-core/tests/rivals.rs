@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+use model_core::friction::series_maxwell::{branches, loss_tangent, shift_decades};
 use model_core::friction::{Contact, FrictionParameters, ModelKind};
 
 const DURATION_S: f64 = 0.4;
@@ -230,4 +231,39 @@ fn zener_rubber_follows_its_equations() {
         .with("c_u_n_s_per_m", 60.0)
         .with("k_1_n_per_m", 6e4);
     assert_follows(&p, &branched(p, vec![(6e4, 3e-3)]), &[0.0; 3], 100);
+}
+
+#[test]
+fn filled_rubber_follows_its_equations() {
+    let p = FrictionParameters::typical(ModelKind::SeriesMaxwell)
+        .with("sigma0_n_per_m", 1e6)
+        .with("c_u_n_s_per_m", 60.0)
+        .with("branch_ratio", 0.5);
+    assert_follows(&p, &branched(p, branches(3e4, 0.5, 0.1, 20.0).to_vec()), &[0.0; 6], 100);
+}
+
+#[test]
+fn filled_rubber_loses_the_same_share_at_every_frequency_and_kelvin_voigt_does_not() {
+    let filled = branches(3e4, 0.2, 0.1, 20.0);
+    for hz in [1.0, 3.0, 10.0, 30.0, 100.0] {
+        let (new, old) = (loss_tangent(3e4, 5.0, &filled, hz), loss_tangent(3e4, 160.0, &[], hz));
+        println!("{hz} Hz: tan δ {new:.3}, Kelvin–Voigt {old:.3}");
+        assert!((0.1..0.3).contains(&new), "{hz} Hz: {new}");
+    }
+    assert!(loss_tangent(3e4, 160.0, &[], 1.0) < 0.04 && loss_tangent(3e4, 160.0, &[], 100.0) > 3.0);
+}
+
+#[test]
+fn warm_rubber_is_fast_rubber() {
+    // Ten degrees near 20 °C are about half a decade for T_g = −50 °C.
+    assert_eq!(shift_decades(20.0), 0.0);
+    assert!((shift_decades(30.0) + 0.56).abs() < 0.02, "{}", shift_decades(30.0));
+    let steady = |temperature_c: f64, v: f64| {
+        let p =
+            FrictionParameters::<f64>::typical(ModelKind::SeriesMaxwell).with("temperature_c", temperature_c);
+        let model = p.model(1e-4).unwrap();
+        model.stribeck().unwrap().coefficient(v)
+    };
+    let slower = 10f64.powf(shift_decades(60.0));
+    assert!((steady(60.0, 0.2) - steady(20.0, 0.2 * slower)).abs() < 1e-12);
 }

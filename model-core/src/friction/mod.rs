@@ -8,6 +8,7 @@
 //! | [`lugre_patch`] | 15–16 | no |
 //! | [`modified_lugre`] | 17–19 | no, the implicit equation has one root (see there) |
 //! | [`series`] | Fig. 25 | yes: the tip speed lags the root speed while the block winds up |
+//! | [`series_maxwell`] | | yes, with the loss of filled rubber over four decades, shifted by temperature |
 //! | [`series_zener`] | | yes, with a block whose damper is elastic |
 //! | [`dahl`] | | no: nothing in it falls with speed |
 //! | [`elasto_plastic`] | | no: as LuGre, without its drift |
@@ -34,6 +35,7 @@ pub mod rate_state;
 #[macro_use]
 mod registry;
 pub mod series;
+pub mod series_maxwell;
 pub mod series_zener;
 pub mod static_curve;
 pub mod stribeck;
@@ -74,4 +76,6 @@ models! {
     Ruina, rate_state::Ruina<T>, rate_state::RateStateState<T>, "ruina";
     /// Zener rubber in series with LuGre bristles.
     SeriesZener, series_zener::SeriesZener<T>, series::SeriesState<T, 1>, "series_zener";
+    /// Filled rubber, a spectrum of Maxwell branches shifted by temperature, in series with LuGre bristles.
+    SeriesMaxwell, series_maxwell::SeriesMaxwell<T>, series::SeriesState<T, 4>, "series_maxwell";
 }
