@@ -336,8 +336,11 @@ mod tests {
                 .contains("parameters.a00 = 0.5: unknown key; allowed: sigma0_n_per_m, ")
         );
         assert_eq!(
-            refused(&LUGRE.replace("lugre", "dahl")),
-            "m.toml:1: kind = \"dahl\": not known; allowed: brush, lugre, modified_lugre, series"
+            refused(&LUGRE.replace("lugre", "glue")),
+            format!(
+                "m.toml:1: kind = \"glue\": not known; allowed: {}",
+                ModelKind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
+            )
         );
         assert!(
             refused(&format!("{LUGRE}k_u_n_per_m = 3e4\n")).starts_with(
