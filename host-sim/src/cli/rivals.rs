@@ -1,5 +1,6 @@
 //! `rig rivals`: what the modified LuGre model can mean, what bristle damping can do, and which models can be told apart.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -59,6 +60,7 @@ struct Cell {
     fitted: String,
     train_nrmse: f64,
     held_out_nrmse: Vec<f64>,
+    parameters: BTreeMap<&'static str, f64>,
 }
 
 impl Rivals {
@@ -73,20 +75,21 @@ impl Rivals {
         let damping = damping_table(&bristle_damping::sweep(&rubber, LOAD_N)?);
         let candidates = all();
         let figures = candidates.iter().map(|c| Plan::figures(&c.typical)).collect::<Result<Vec<_>, _>>()?;
-        let compete = |what: &str, plans: &[Plan]| {
+        let compete = |what: &str, plans: &[Plan], before: Option<&Tournament>| {
             let bar = Mutex::new(Progress::new(what, 1));
-            play(&candidates, plans, |done, total| {
+            play(&candidates, plans, before, |done, total| {
                 if let Ok(mut bar) = bar.lock() {
                     bar.of(total as u64);
                     bar.set(done as u64);
                 }
             })
         };
-        let first = compete("figs. 18–21", &figures)?;
+        let first = compete("figs. 18–21", &figures, None)?;
         let second = if self.figures_only {
             None
         } else {
-            Some(compete("steps and holds too", &figures.iter().map(Plan::and_more).collect::<Vec<_>>())?)
+            let plans: Vec<Plan> = figures.iter().map(Plan::and_more).collect();
+            Some(compete("steps and holds too", &plans, Some(&first))?)
         };
         let mut blocks = vec![
             Block::Heading("Eqs. 17–19, read in every way".into()),
@@ -155,6 +158,14 @@ fn cells(tournament: &Tournament) -> Vec<Cell> {
         fitted: name(m.fitted),
         train_nrmse: m.train_nrmse,
         held_out_nrmse: m.held_out_nrmse.clone(),
+        parameters: m
+            .parameters
+            .kind()
+            .parameters()
+            .iter()
+            .map(|spec| spec.name)
+            .zip(m.parameters.values().iter().copied())
+            .collect(),
     };
     tournament.matches.iter().map(cell).collect()
 }

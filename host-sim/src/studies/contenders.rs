@@ -62,7 +62,7 @@ pub fn five(
             name: "LuGre, eqs. 12–14",
             role: Role::Lugre,
             why: "It cannot: at constant speed g(v) is one number, and the deflection rises monotonically to \
-                  F_N g(v)/σ0.",
+                  F_N g(v)/σ0. Its force could with σ1 v > F_N g(v); here σ1 = 0.",
             parameters: element(FrictionParameters::lugre(&bristles)),
         },
         Contender {
@@ -82,7 +82,7 @@ pub fn five(
             name: "modified LuGre, eqs. 17–19",
             role: Role::ModifiedLugre,
             why: "It cannot: the equation for the asperities' speed s has exactly one root, so u̇ depends on u alone, \
-                  and u rises monotonically. The printed overshoot comes from taking u̇ of the step before.",
+                  and u rises monotonically (a0 > a1 δ e^{−(1 + 1/δ)}, σ1 = 0). A rate that lags gives an overshoot.",
             parameters: element(FrictionParameters::modified_lugre(&bristles)),
         },
         Contender {

@@ -13,7 +13,7 @@ use crate::studies::bristle_damping::file;
 use model_core::friction::{Contact, FrictionModel, FrictionParameters};
 
 /// The part of Figs. 18–21 in which something happens, s.
-const WINDOW_S: (f64, f64) = (3.45, 4.45);
+const WINDOW_S: (f64, f64) = (3.48, 4.18);
 /// Control periods from one compared force to the next.
 const EVERY: usize = 10;
 
@@ -58,11 +58,11 @@ impl Course {
             name,
             &[
                 (0.0, slow, load_n),
-                (0.3, slow, load_n),
-                (0.3 + quick, fast, load_n),
-                (0.6, fast, load_n),
-                (0.6 + quick, slow, load_n),
-                (0.9, slow, load_n),
+                (0.15, slow, load_n),
+                (0.15 + quick, fast, load_n),
+                (0.3, fast, load_n),
+                (0.3 + quick, slow, load_n),
+                (0.45, slow, load_n),
             ],
         )
     }
@@ -73,11 +73,11 @@ impl Course {
             name,
             &[
                 (0.0, speed, light_n),
-                (0.2, speed, light_n),
-                (0.2 + quick, speed, heavy_n),
-                (0.5, speed, heavy_n),
-                (0.5 + quick, speed, light_n),
-                (0.8, speed, light_n),
+                (0.15, speed, light_n),
+                (0.15 + quick, speed, heavy_n),
+                (0.3, speed, heavy_n),
+                (0.3 + quick, speed, light_n),
+                (0.45, speed, light_n),
             ],
         )
     }
@@ -86,12 +86,12 @@ impl Course {
         let (mut t, mut points) = (0.0, vec![(0.0, speed, load_n)]);
         let ramp = 2e-3;
         for hold_s in holds_s {
-            for (span_s, v) in [(0.15, speed), (ramp, 0.0), (hold_s, 0.0), (ramp, speed)] {
+            for (span_s, v) in [(0.1, speed), (ramp, 0.0), (hold_s, 0.0), (ramp, speed)] {
                 t += span_s;
                 points.push((t, v, load_n));
             }
         }
-        points.push((t + 0.15, speed, load_n));
+        points.push((t + 0.1, speed, load_n));
         Self::through(name, &points)
     }
 

@@ -10,7 +10,7 @@ use model_core::friction::FrictionParameters;
 /// Step of the one-sided differences.
 const DIFFERENCE: f64 = 1e-5;
 /// Evaluations of a start, over the number of parameters + 1.
-const PATIENCE: usize = 15;
+const PATIENCE: usize = 12;
 
 struct Problem<'a> {
     candidate: &'a Candidate,
@@ -72,16 +72,22 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     }
 }
 
-/// The best parameters of a candidate from all of its starts; `None` where no start has finite residuals.
+/// The best parameters of a candidate from `known` numbers, or from all of its starts where none are known; `None` where
+/// no start has finite residuals.
 pub(super) fn fit(
     candidate: &Candidate,
+    known: Option<FrictionParameters<f64>>,
     residuals: &dyn Fn(&FrictionParameters<f64>) -> Option<Vec<f64>>,
 ) -> Option<FrictionParameters<f64>> {
     let specs = candidate.typical.kind().parameters();
-    let unchanged = Vec::new();
-    let starts = std::iter::once(&unchanged)
-        .chain(&candidate.other_starts)
-        .map(|changes| changes.iter().fold(candidate.typical, |p, (name, value)| p.with(name, *value)));
+    let own = || {
+        let changed = candidate
+            .other_starts
+            .iter()
+            .map(|changes| changes.iter().fold(candidate.typical, |p, (name, value)| p.with(name, *value)));
+        std::iter::once(candidate.typical).chain(changed).collect()
+    };
+    let starts: Vec<FrictionParameters<f64>> = known.map_or_else(own, |known| vec![known]);
     let mut best: Option<(f64, FrictionParameters<f64>)> = None;
     for start in starts {
         let coordinates = candidate.free.iter().map(|(place, low, high)| {
@@ -90,8 +96,8 @@ pub(super) fn fit(
         let first = DVector::from_iterator(candidate.free.len(), coordinates);
         let problem = Problem { candidate, residuals, at: first };
         let (problem, report) = LevenbergMarquardt::new()
-            .with_ftol(1e-6)
-            .with_xtol(1e-6)
+            .with_ftol(1e-5)
+            .with_xtol(1e-5)
             .with_patience(PATIENCE)
             .minimize(problem);
         let cost = report.objective_function;

@@ -22,6 +22,8 @@ pub struct Match {
     pub train_nrmse: f64,
     /// The same on each of the logs held out.
     pub held_out_nrmse: Vec<f64>,
+    /// The numbers found.
+    pub parameters: FrictionParameters<f64>,
 }
 
 impl Match {
@@ -79,13 +81,14 @@ fn errors(seen: &[Vec<f64>], predicted: &[Vec<f64>]) -> Vec<f64> {
     seen.iter().zip(predicted).map(error).collect()
 }
 
-/// Plays all matches, those of each truth on its own plan. `progress` is told the matches played of all.
+/// Plays all matches, those of each truth on its own plan, from what `before` found where it is given. `progress` is told the matches played of all.
 ///
 /// # Errors
 /// A truth that cannot be run.
 pub fn play(
     candidates: &[Candidate],
     plans: &[Plan],
+    before: Option<&Tournament>,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Tournament, InputError> {
     let count = candidates.len();
@@ -112,9 +115,12 @@ pub fn play(
                     }
                     let (truth, fitted) = (turn / count, turn % count);
                     let (plan, (train, held_out)) = (&plans[truth], &truths[truth]);
-                    let played = one(&candidates[fitted], plan, train, held_out);
-                    if let (Some((train_nrmse, held_out_nrmse)), Ok(mut all)) = (played, matches.lock()) {
-                        all.push(Match { truth, fitted, train_nrmse, held_out_nrmse });
+                    let known = before.and_then(|t| t.of(truth, fitted)).map(|m| m.parameters);
+                    let played = one(&candidates[fitted], known, plan, train, held_out);
+                    if let (Some((parameters, train_nrmse, held_out_nrmse)), Ok(mut all)) =
+                        (played, matches.lock())
+                    {
+                        all.push(Match { truth, fitted, train_nrmse, held_out_nrmse, parameters });
                     }
                     progress(done.fetch_add(1, Ordering::Relaxed) + 1, count * count);
                 }
@@ -132,10 +138,11 @@ pub fn play(
 
 fn one(
     candidate: &Candidate,
+    known: Option<FrictionParameters<f64>>,
     plan: &Plan,
     train: &[Vec<f64>],
     held_out: &[Vec<f64>],
-) -> Option<(f64, Vec<f64>)> {
+) -> Option<(FrictionParameters<f64>, f64, Vec<f64>)> {
     let scales: Vec<f64> =
         train.iter().map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9)).collect();
     let residuals = |p: &FrictionParameters<f64>| {
@@ -146,11 +153,11 @@ fn one(
                 .collect::<Vec<_>>(),
         )
     };
-    let found = fit(candidate, &residuals)?;
+    let found = fit(candidate, known, &residuals)?;
     let root_mean_square =
         |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     let train_nrmse = root_mean_square(errors(train, &forces(&found, &plan.train)?));
-    Some((train_nrmse, errors(held_out, &forces(&found, &plan.held_out)?)))
+    Some((found, train_nrmse, errors(held_out, &forces(&found, &plan.held_out)?)))
 }
 
 #[cfg(test)]
@@ -169,8 +176,8 @@ mod tests {
         let run = |courses: &[Course]| forces(&truth.typical, courses).unwrap();
         let (train, held_out) = (run(&plan.train), run(&plan.held_out));
         let (own, lugre) = (
-            one(&moved, &plan, &train, &held_out).unwrap().1[0],
-            one(&pick("lugre"), &plan, &train, &held_out).unwrap().1[0],
+            one(&moved, None, &plan, &train, &held_out).unwrap().2[0],
+            one(&pick("lugre"), None, &plan, &train, &held_out).unwrap().2[0],
         );
         assert!(own < 1e-3, "the series element on its own log: {own}");
         assert!(lugre > 10.0 * own && lugre > 5e-3, "LuGre: {lugre}");
