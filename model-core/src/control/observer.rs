@@ -1,7 +1,8 @@
 //! Model observer: what friction should be by the model, from measured speed and normal force, and what is left.
 //!
 //! Three elements touch the disc at 120°, so the model of the whole contact is split into [`N_ELEMENTS`] equal ones:
-//! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. Around
+//! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. They do the same,
+//! so one is stepped. Around
 //! the three stand the effects of [`crate::extension`] that a diagnosis added: they act on speed, load and friction
 //! coefficient of the contact, and on what the friction channel shows.
 //! A patch is one of [`PATCH_BRISTLES`] bristles for the whole contact. Rubber is taken to run through it at the sliding
@@ -49,14 +50,14 @@ enum Rubber {
 /// What the rubber remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum RubberState {
-    Elements([FrictionState<f32>; N_ELEMENTS]),
+    Element(FrictionState<f32>),
     Patch(PatchState<f32, PATCH_BRISTLES>),
 }
 
 impl Rubber {
     fn rest(&self) -> RubberState {
         match self {
-            Self::Element(element) => RubberState::Elements([element.rest(); N_ELEMENTS]),
+            Self::Element(element) => RubberState::Element(element.rest()),
             Self::Patch(_) => RubberState::Patch(PatchState::default()),
         }
     }
@@ -65,18 +66,13 @@ impl Rubber {
     #[inline(always)]
     fn step(&self, state: &mut RubberState, whole: &Contact<f32>) -> FrictionForce<f32> {
         match (self, &mut *state) {
-            (Self::Element(element), RubberState::Elements(elements)) => {
+            (Self::Element(element), RubberState::Element(state)) => {
                 let load_n = whole.normal_force_n * (1.0 / N_ELEMENTS as f32);
                 let part = Contact { normal_force_n: load_n, ..*whole };
-                let mut sum = FrictionForce::default();
-                for state in elements {
-                    let one = element.step(state, &part);
-                    sum = FrictionForce {
-                        force_n: sum.force_n + one.force_n,
-                        tip_speed_m_s: one.tip_speed_m_s,
-                    };
-                }
-                sum
+                // Equal elements under equal loads do the same to the last bit, so one is stepped and counted for all.
+                let one = element.step(state, &part);
+                let force_n = (0..N_ELEMENTS).fold(0.0, |sum, _| sum + one.force_n);
+                FrictionForce { force_n, ..one }
             }
             (Self::Patch(patch), RubberState::Patch(bristles)) => FrictionForce {
                 force_n: patch.step(bristles, whole, whole.sliding_speed_m_s),
