@@ -15,7 +15,7 @@ use crate::report::{Block, Page, Table};
 use crate::studies::bristle_damping::{self, Damped};
 use crate::studies::contenders::rubber_of;
 use crate::studies::readings::{self, Row, SPEEDS_RPM};
-use crate::studies::rivals::{Plan, Tournament, all, play};
+use crate::studies::rivals::{Candidate, Plan, Tournament, all, play};
 
 /// Load of the comparisons, N: that of Figs. 18–21.
 const LOAD_N: f64 = 88.0;
@@ -28,6 +28,7 @@ const NOISE: f64 = 2.7e-3;
 Example:
   rig rivals --out target/rivals
   rig rivals --figures-only --out target/rivals
+  rig rivals --rubber series --out target/rivals
 
 Prints and writes three tables.
 Readings: eqs. 17–19 of the paper in every way they can be read, each with its overshoot at 10, 20, 30, 120 rpm.
@@ -42,6 +43,9 @@ pub(super) struct Rivals {
     /// The paper's experiments only
     #[arg(long)]
     figures_only: bool,
+    /// Only these models play the rubber; all where left out
+    #[arg(long, value_name = "MODEL", num_args = 1..)]
+    rubber: Vec<String>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "target/rivals")]
     out: PathBuf,
@@ -74,8 +78,15 @@ impl Rivals {
         let needed = bristle_damping::needed(&rubber, LOAD_N)?;
         let damping = damping_table(&bristle_damping::sweep(&rubber, LOAD_N)?);
         let candidates = all();
-        let figures = candidates.iter().map(|c| Plan::figures(&c.typical)).collect::<Result<Vec<_>, _>>()?;
-        let compete = |what: &str, plans: &[Plan], before: Option<&Tournament>| {
+        let names: Vec<&str> = candidates.iter().map(|c| c.name.as_str()).collect();
+        if let Some(unknown) = self.rubber.iter().find(|name| !names.contains(&name.as_str())) {
+            let refusal = InputError::new("no such model").key("--rubber").value(unknown);
+            return Err(refusal.allowed(names.join(", ")));
+        }
+        let plays = |name: &String| self.rubber.is_empty() || self.rubber.contains(name);
+        let plan = |c: &Candidate| plays(&c.name).then(|| Plan::figures(&c.typical)).transpose();
+        let figures = candidates.iter().map(plan).collect::<Result<Vec<_>, _>>()?;
+        let compete = |what: &str, plans: &[Option<Plan>], before: Option<&Tournament>| {
             let bar = Mutex::new(Progress::new(what, 1));
             play(&candidates, plans, before, |done, total| {
                 if let Ok(mut bar) = bar.lock() {
@@ -88,7 +99,7 @@ impl Rivals {
         let second = if self.figures_only {
             None
         } else {
-            let plans: Vec<Plan> = figures.iter().map(Plan::and_more).collect();
+            let plans: Vec<_> = figures.iter().map(|plan| plan.as_ref().map(Plan::and_more)).collect();
             Some(compete("steps and holds too", &plans, Some(&first))?)
         };
         let mut blocks = vec![
@@ -210,7 +221,8 @@ fn matrix(tournament: &Tournament) -> Table {
         };
         [names[truth].clone()].into_iter().chain((0..names.len()).map(cell)).collect()
     };
-    Table { head, rows: (0..names.len()).map(row).collect() }
+    let played = (0..names.len()).filter(|truth| tournament.matches.iter().any(|m| m.truth == *truth));
+    Table { head, rows: played.map(row).collect() }
 }
 
 fn alike(tournament: &Tournament) -> Vec<String> {
@@ -221,7 +233,8 @@ fn alike(tournament: &Tournament) -> Vec<String> {
         let text = if text.is_empty() { "nothing else".to_string() } else { text.join(", ") };
         format!("{}: within the noise {text}", tournament.names[truth])
     };
-    (0..tournament.names.len()).map(line).collect()
+    let played = |truth: &usize| tournament.matches.iter().any(|m| m.truth == *truth);
+    (0..tournament.names.len()).filter(played).map(line).collect()
 }
 
 /// A table for the terminal.

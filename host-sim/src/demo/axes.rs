@@ -189,7 +189,7 @@ fn later_load_row() -> Result<Vec<String>, InputError> {
         "At 120 rpm friction is markedly lower when the normal force has the value at the peak again (Fig. 21).",
         if holds { "only if the normal force has a suitable mode" } else { "no" },
         found,
-        "cargo rig simulate --experiment fig21 --set rig.pressure.mode_hz=40.0 rig.pressure.damping_ratio=0.5 --out run",
+        "cargo rig simulate --experiment fig21 --set rig.pressure.mode_hz=200.0 rig.pressure.damping_ratio=0.5 --out run",
     ))
 }
 
@@ -242,7 +242,7 @@ fn crossing_row(runs: &Runs) -> Result<Vec<String>, InputError> {
         word,
         format!(
             "Series element, by sliding and rolling speed, maximum over the end: {}. Where the block's damping carries most \
-             of the force, u rises without a maximum though the force has one; where the patch is left early, neither has.",
+             of the force, u rises without a maximum though the force has one.",
             each.join("; ")
         ),
         "cargo rig simulate --experiment fig26 --set experiment.slip.sliding_speed_m_s=0.3 --out run",

@@ -16,8 +16,8 @@ use model_core::friction::stribeck::{Stribeck, StribeckParameters};
 pub const SPEEDS_RPM: [f64; 4] = [10.0, 20.0, 30.0, 120.0];
 /// Distance of the elements from the disc's axis, m.
 const RADIUS_M: f64 = 0.06;
-/// Steps of the continuous readings, s.
-const FINE_S: f64 = 2e-6;
+/// Steps of the continuous readings over which LuGre's bristles wind up.
+const STEPS_OF_WIND_UP: f64 = 2000.0;
 /// Above this an overshoot would be seen in a plot.
 const SEEN: f64 = 0.01;
 
@@ -108,7 +108,7 @@ impl Case {
         let duration_s = 40.0 * steady / self.stiffness_per_load / v;
         let step_s = match reading {
             Reading::PreviousStep(step_s) => step_s,
-            _ => FINE_S,
+            _ => steady / self.stiffness_per_load / v / STEPS_OF_WIND_UP,
         };
         let steps = (duration_s / step_s) as usize;
         let (mut y, mut s) = (0.0f64, 0.0f64);

@@ -67,7 +67,10 @@ impl Tournament {
     }
 }
 
-fn forces(p: &FrictionParameters<f64>, courses: &[Course]) -> Option<Vec<Vec<f64>>> {
+/// Forces on each course.
+type Forces = Vec<Vec<f64>>;
+
+fn forces(p: &FrictionParameters<f64>, courses: &[Course]) -> Option<Forces> {
     let model = p.model(PERIOD_S).ok()?;
     Some(courses.iter().map(|course| course.force_n(&model)).collect())
 }
@@ -81,25 +84,28 @@ fn errors(seen: &[Vec<f64>], predicted: &[Vec<f64>]) -> Vec<f64> {
     seen.iter().zip(predicted).map(error).collect()
 }
 
-/// Plays all matches, those of each truth on its own plan, from what `before` found where it is given. `progress` is told the matches played of all.
+/// Plays the matches of each truth that has a plan, on that plan, from what `before` found where it is given. `progress` is told the matches played of all.
 ///
 /// # Errors
 /// A truth that cannot be run.
 pub fn play(
     candidates: &[Candidate],
-    plans: &[Plan],
+    plans: &[Option<Plan>],
     before: Option<&Tournament>,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Tournament, InputError> {
     let count = candidates.len();
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let matches = Mutex::new(Vec::new());
-    let truths: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> = candidates
+    let truths: Vec<(usize, &Plan, Forces, Forces)> = candidates
         .iter()
         .zip(plans)
-        .map(|(truth, plan)| {
+        .enumerate()
+        .filter_map(|(place, (truth, plan))| plan.as_ref().map(|plan| (place, truth, plan)))
+        .map(|(place, truth, plan)| {
             let run = |courses: &[Course]| forces(&truth.typical, courses);
-            run(&plan.train).zip(run(&plan.held_out)).ok_or_else(|| {
+            let both = run(&plan.train).zip(run(&plan.held_out));
+            both.map(|(train, held_out)| (place, plan, train, held_out)).ok_or_else(|| {
                 InputError::new("a candidate's own numbers are out of range").value(&truth.name)
             })
         })
@@ -110,11 +116,12 @@ pub fn play(
             scope.spawn(|| {
                 loop {
                     let turn = next.fetch_add(1, Ordering::Relaxed);
-                    if turn >= count * count {
+                    if turn >= truths.len() * count {
                         break;
                     }
-                    let (truth, fitted) = (turn / count, turn % count);
-                    let (plan, (train, held_out)) = (&plans[truth], &truths[truth]);
+                    let fitted = turn % count;
+                    let (truth, plan, train, held_out) = &truths[turn / count];
+                    let truth = *truth;
                     let known = before.and_then(|t| t.of(truth, fitted)).map(|m| m.parameters);
                     let played = one(&candidates[fitted], known, plan, train, held_out);
                     if let (Some((parameters, train_nrmse, held_out_nrmse)), Ok(mut all)) =
@@ -122,7 +129,7 @@ pub fn play(
                     {
                         all.push(Match { truth, fitted, train_nrmse, held_out_nrmse, parameters });
                     }
-                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, count * count);
+                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, truths.len() * count);
                 }
             });
         }
@@ -131,7 +138,11 @@ pub fn play(
     matches.sort_by_key(|m| (m.truth, m.fitted));
     Ok(Tournament {
         names: candidates.iter().map(|c| c.name.clone()).collect(),
-        held_out: plans.first().map_or(Vec::new(), |p| p.held_out.iter().map(|c| c.name.clone()).collect()),
+        held_out: plans
+            .iter()
+            .flatten()
+            .next()
+            .map_or(Vec::new(), |p| p.held_out.iter().map(|c| c.name.clone()).collect()),
         matches,
     })
 }
