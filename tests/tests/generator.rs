@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use rig_tests::{
-    Base, Effect, Form, GeneratedCase, Plan, Scenario, ScenarioError, effect::Subsystem, generate,
+    Base, Effect, Form, GeneratedCase, Imperfection, Plan, Scenario, ScenarioError, effect::Subsystem,
+    generate,
 };
 
 /// A CSV log as columns.
@@ -86,8 +87,9 @@ fn each_effect_changes_the_signals_of_its_subsystem_well_beyond_noise() {
                 .iter()
                 .map(|(name, sigma)| rms_between(with.column(name), without.column(name)) / sigma)
                 .fold(0.0, f64::max);
-            // Three times the standard deviation of the noise of a single sample, in every log.
-            assert!(most > 3.0, "{} log {log}: {most:.1} times the noise", effect.id());
+            // Twice the standard deviation of the noise of a single sample as RMS, in every log: weak effects are
+            // 2 % of a channel whose noise is 0.4 to 0.7 %.
+            assert!(most > 2.0, "{} log {log}: {most:.1} times the noise", effect.id());
         }
     }
 }
@@ -105,7 +107,7 @@ fn each_drive_effect_changes_the_torque_of_a_drive_log_well_beyond_noise() {
             let sigma = with.truth.noise.m2_torque_nm * unit;
             for (with, without) in logs(&with).iter().zip(&logs(&without)) {
                 let change = rms_between(with.column(name), without.column(name)) / sigma;
-                assert!(change > 3.0, "{form:?} {}: {change:.1} times the noise", effect.id());
+                assert!(change > 2.0, "{form:?} {}: {change:.1} times the noise", effect.id());
             }
         }
     }
@@ -147,6 +149,7 @@ fn columns_are_complete_and_time_is_regular_at_every_rate() {
             rate_hz,
             duration_s: 3.0,
             temperature_sensor: true,
+            imperfection: Imperfection::None,
             ..Scenario::new(&[Effect::DiscAngle], 3)
         })
         .unwrap();
@@ -246,8 +249,8 @@ fn the_model_file_is_near_the_truth_but_not_the_truth() {
     let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&[], 11) }).unwrap();
     let (truth, nominal) = (case.truth.friction.unwrap(), case.truth.nominal.unwrap());
     assert_ne!(truth, nominal);
-    assert!((nominal.a0 / truth.a0 - 1.0).abs() < 0.13);
-    assert!((nominal.sigma0_n_per_m / truth.sigma0_n_per_m - 1.0).abs() < 0.31);
+    let within = |nominal: f64, truth: f64| (nominal / truth).ln().abs() < 1.31_f64.ln();
+    assert!(within(nominal.a0, truth.a0) && within(nominal.sigma0_n_per_m, truth.sigma0_n_per_m));
 }
 
 #[test]
