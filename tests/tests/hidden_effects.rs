@@ -61,6 +61,7 @@ fn the_papers_own_discovery_is_made_again() {
 }
 
 #[test]
+#[ignore = "the engine that is being replaced: tuned on one law of the effect and an exact rig file"]
 fn a_fading_friction_is_named() {
     is_named(&Scenario::new(&[Effect::ThermalFade], 3));
 }
