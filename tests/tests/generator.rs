@@ -290,3 +290,61 @@ fn there_are_27_names_and_each_is_found_by_its_id() {
         assert!(one.tells_apart_from(other) && one.is_known() && other.is_known());
     }
 }
+
+#[test]
+fn strong_imperfections_leave_out_rows_and_shift_instants_and_mild_ones_are_below_the_noise() {
+    let of = |imperfection| {
+        let scenario = Scenario { imperfection, duration_s: 6.0, ..Scenario::new(&[], 4) };
+        let case = generate(&scenario).unwrap();
+        (case.truth.imperfections, case.truth.noise, logs(&case))
+    };
+    let (_, _, perfect) = of(Imperfection::None);
+    let (numbers, _, strong) = of(Imperfection::Strong);
+    assert!(numbers.friction_hum_nm > 0.0 && numbers.bounce_share > 0.0);
+    for (perfect, strong) in perfect.iter().zip(&strong) {
+        let (all, kept) = (perfect.column("time_s"), strong.column("time_s"));
+        assert!(
+            kept.len() < all.len() - 3 && kept.len() > all.len() * 9 / 10,
+            "{} of {}",
+            kept.len(),
+            all.len()
+        );
+        let steps: Vec<f64> = kept.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        // Eight rows missing at most, each instant a third of a period off at most.
+        assert!(steps.iter().all(|step| (0.3e-3..9.8e-3).contains(step)));
+        assert!(steps.iter().any(|step| *step > 1.9e-3), "rows are missing");
+        assert!(steps.iter().filter(|step| (*step - 1e-3).abs() > 2e-5).count() > steps.len() / 10, "jitter");
+    }
+    for seed in 0..20 {
+        let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&[], seed) }).unwrap();
+        let (mild, noise) = (case.truth.imperfections, case.truth.noise);
+        assert!(
+            mild.friction_hum_nm < noise.friction_nm && mild.normal_hum_n < noise.normal_n,
+            "seed {seed}"
+        );
+    }
+}
+
+#[test]
+fn an_amplifier_clips_before_the_noise_and_a_converter_after_it() {
+    let mut seen = std::collections::BTreeSet::new();
+    for seed in 0..40 {
+        let case =
+            generate(&Scenario { duration_s: 3.0, ..Scenario::new(&[Effect::AdcSaturation], seed) }).unwrap();
+        let law = case.truth.law_names["adc_saturation"].clone();
+        let laws = serde_json::to_value(&case.truth.laws).unwrap();
+        if laws["adc_saturation"]["channel"] != "friction" || !["rails", "converter"].contains(&law.as_str())
+        {
+            continue;
+        }
+        let logs = logs(&case);
+        let values: Vec<f64> =
+            logs.iter().flat_map(|log| log.column("friction_torque_nm")).copied().collect();
+        let top = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let at_top = values.iter().filter(|value| value.abs() == top).count() as f64 / values.len() as f64;
+        // A tenth to a third of the samples clip; behind the noise hardly two of the largest are equal.
+        assert_eq!(law == "converter", at_top > 0.05, "seed {seed} {law}: {at_top}");
+        seen.insert(law);
+    }
+    assert_eq!(seen.len(), 2, "{seen:?}");
+}

@@ -2,11 +2,12 @@
 //!
 //! - pure: y(t) = x(t − T) (transport, buffers; J. E. Normey-Rico, E. F. Camacho, *Control of Dead-time
 //!   Processes*, 2007);
-//! - average: mean over the last 2T, a digital filter of linear phase: all frequencies late by T (A. V.
-//!   Oppenheim, R. W. Schafer, *Discrete-Time Signal Processing*, 1989);
+//! - average: a part of T, 0.1 to 0.4 of it, is a mean over twice that time, a digital filter of linear phase (A.
+//!   V. Oppenheim, R. W. Schafer, *Discrete-Time Signal Processing*, 1989), the rest is pure;
 //! - held: taken every P and passed on after D, T = D + P/2 (bus cycle of a fieldbus drive or converter; K. J.
 //!   Åström, B. Wittenmark, *Computer-Controlled Systems*, 1984);
-//! - reserved, Bessel: fourth order, maximally flat delay T (W. E. Thomson, Proc. IEE 96, 1949).
+//! - reserved, Bessel: a part, 0.2 to 0.5 of T, is a fourth-order filter of maximally flat delay (W. E. Thomson,
+//!   Proc. IEE 96, 1949), the rest is pure.
 
 use std::collections::VecDeque;
 
@@ -24,9 +25,9 @@ const BESSEL: [(f64, f64); 2] = [(3.023_265, 0.958_044), (3.389_366, 0.620_703)]
 #[serde(tag = "law", rename_all = "snake_case")]
 enum Way {
     Pure,
-    Average,
+    Average { share: f64 },
     Held { period_s: f64 },
-    Bessel,
+    Bessel { share: f64 },
 }
 
 /// A lateness.
@@ -44,9 +45,9 @@ impl Lateness {
         let delay_s = s.log_uniform(low_s, high_s);
         let way = match family.pick(s, &[0, 1, 2], 3) {
             0 => Way::Pure,
-            1 => Way::Average,
+            1 => Way::Average { share: s.uniform(0.1, 0.4) },
             2 => Way::Held { period_s: s.uniform(0.3, 0.9) * delay_s },
-            _ => Way::Bessel,
+            _ => Way::Bessel { share: s.uniform(0.2, 0.5) },
         };
         Self { way, delay_s }
     }
@@ -54,22 +55,25 @@ impl Lateness {
     /// The same as a running filter that has seen `start` for ever.
     #[must_use]
     pub fn running(&self, step_s: f64, start: f64) -> Late {
+        let rest = |share: f64| Delay::new((1.0 - share) * self.delay_s, step_s, start);
         match self.way {
             Way::Pure => Late::Pure(Delay::new(self.delay_s, step_s, start)),
-            Way::Average => {
-                let count = ((2.0 * self.delay_s / step_s).round() as usize).max(1);
-                Late::Average { past: VecDeque::from(vec![start; count]), sum: start * count as f64 }
+            Way::Average { share } => {
+                let count = ((2.0 * share * self.delay_s / step_s).round() as usize).max(1);
+                let past = VecDeque::from(vec![start; count]);
+                Late::Average { past, sum: start * count as f64, after: rest(share) }
             }
             Way::Held { period_s } => {
                 let every = ((period_s / step_s).round() as usize).max(1);
                 let rest = self.delay_s - 0.5 * every as f64 * step_s;
                 Late::Held { every, phase: 0, held: start, after: Delay::new(rest.max(0.0), step_s, start) }
             }
-            Way::Bessel => {
+            Way::Bessel { share } => {
                 let mode = |(w, ratio): (f64, f64)| {
-                    Mode::new(w / self.delay_s / std::f64::consts::TAU, ratio, step_s, start)
+                    let hz = w / (share * self.delay_s) / std::f64::consts::TAU;
+                    Mode::new(hz, ratio, step_s, start)
                 };
-                Late::Bessel(mode(BESSEL[0]), mode(BESSEL[1]))
+                Late::Bessel(mode(BESSEL[0]), mode(BESSEL[1]), rest(share))
             }
         }
     }
@@ -86,6 +90,8 @@ pub enum Late {
         past: VecDeque<f64>,
         /// Their sum.
         sum: f64,
+        /// What follows.
+        after: Delay,
     },
     /// Sample and hold.
     Held {
@@ -98,8 +104,8 @@ pub enum Late {
         /// What follows.
         after: Delay,
     },
-    /// Two second-order sections.
-    Bessel(Mode, Mode),
+    /// Two second-order sections, and what follows.
+    Bessel(Mode, Mode, Delay),
 }
 
 impl Late {
@@ -107,11 +113,11 @@ impl Late {
     pub fn step(&mut self, input: f64) -> f64 {
         match self {
             Self::Pure(delay) => delay.step(input),
-            Self::Average { past, sum } => {
+            Self::Average { past, sum, after } => {
                 let count = past.len() as f64;
                 past.push_back(input);
                 *sum += input - past.pop_front().unwrap_or(input);
-                *sum / count
+                after.step(*sum / count)
             }
             Self::Held { every, phase, held, after } => {
                 if *phase == 0 {
@@ -120,9 +126,9 @@ impl Late {
                 *phase = (*phase + 1) % *every;
                 after.step(*held)
             }
-            Self::Bessel(first, second) => {
+            Self::Bessel(first, second, after) => {
                 let between = first.step(input);
-                second.step(between)
+                after.step(second.step(between))
             }
         }
     }

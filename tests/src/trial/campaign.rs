@@ -191,6 +191,29 @@ mod tests {
     }
 
     #[test]
+    fn seeds_come_from_a_clean_commit_only_or_are_said_not_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let here = folder.path();
+        let commit = |text: &str| {
+            std::fs::write(here.join("file"), text).unwrap();
+            git(here, &["add", "file"]).unwrap();
+            let who = ["-c", "user.name=test", "-c", "user.email=test@example.org"];
+            git(here, &[&who[..], &["commit", "--quiet", "--no-gpg-sign", "-m", text]].concat()).unwrap();
+            git(here, &["rev-parse", "HEAD"]).unwrap()
+        };
+        git(here, &["init", "--quiet"]).unwrap();
+        let (first, second) = (commit("one"), commit("two"));
+        let head = Commit::of(here, "HEAD", false).unwrap();
+        assert_eq!((head.hash.as_str(), head.dirty), (second.as_str(), false));
+        assert!(Commit::of(here, &first, false).unwrap_err().contains(&second[..12]));
+        std::fs::write(here.join("file"), "three").unwrap();
+        assert!(Commit::of(here, "HEAD", false).unwrap_err().contains("1 files differ"));
+        let dirty = Commit::of(here, "HEAD", true).unwrap();
+        assert!(dirty.dirty && dirty.words().contains("changes"));
+        assert_eq!(dirty.first_round(), head.first_round());
+    }
+
+    #[test]
     fn another_commit_has_other_seeds() {
         let of = |hash: &str| Commit { hash: hash.into(), dirty: false }.first_round();
         assert_eq!(of("00000000ff0123"), 0xff);
