@@ -237,14 +237,14 @@ mod tests {
                 }
                 Reading::TipSpeed => assert!(row.roots == 2 && !row.figures[0].settles, "{row:?}"),
                 // The figures of the steep curve.
-                Reading::PreviousStep(step_s) if step_s == 1e-3 => {
+                Reading::PreviousStep(1e-3) => {
                     assert!((row.steep.overshoot - 0.14).abs() < 0.01, "{row:?}");
                 }
                 Reading::PreviousStep(_) => assert!(row.steep.overshoot < 5e-3, "{row:?}"),
-                Reading::Lag(time_s) if time_s == 2e-3 => {
+                Reading::Lag(2e-3) => {
                     assert!((row.steep.overshoot - 0.12).abs() < 0.02, "{row:?}");
                 }
-                Reading::Lag(time_s) if time_s == 5e-3 => {
+                Reading::Lag(5e-3) => {
                     assert!((row.steep.overshoot - 0.34).abs() < 0.02, "{row:?}");
                 }
                 Reading::Lag(_) => assert!(row.steep.overshoot > 0.34, "{row:?}"),
