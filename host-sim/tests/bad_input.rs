@@ -232,8 +232,9 @@ fn an_unknown_key_is_refused_and_the_known_ones_are_listed() {
 fn unknown_kinds_and_effects_are_refused_and_the_known_ones_are_listed() {
     file_refused(
         "model.toml",
-        &MODEL.replace("lugre", "dahl"),
-        "model.toml:1: kind = \"dahl\": not known; allowed: brush, lugre, modified_lugre, series",
+        &MODEL.replace("lugre", "glue"),
+        "model.toml:1: kind = \"glue\": not known; allowed: brush, lugre, modified_lugre, modified_lugre_fold, series, dahl, \
+         elasto_plastic, frictional_lag, maxwell_slip, dieterich, ruina, series_zener, series_maxwell",
     );
     file_refused(
         "model.toml",

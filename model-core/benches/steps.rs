@@ -5,12 +5,9 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use model_core::friction::brush::BrushParameters;
-use model_core::friction::lugre::LugreParameters;
 use model_core::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
-use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::StribeckParameters;
-use model_core::friction::{Contact, FrictionModel};
+use model_core::friction::{Contact, FrictionParameters, ModelKind};
 use std::hint::black_box;
 
 /// Steps per measurement; the time printed is for all of them.
@@ -27,21 +24,12 @@ fn motion() -> Vec<Contact<f32>> {
 
 fn steps(c: &mut Criterion) {
     let stribeck = StribeckParameters { a0: 0.5, a1: 0.7, v0_m_s: 0.5, delta: 0.5, theta: 1.0 };
-    let bristles =
-        LugreParameters { sigma0_n_per_m: 1.76e7f32, sigma1_n_s_per_m: 0.0, a2_s_per_m: 0.0, stribeck };
-    let series = SeriesParameters { k_u_n_per_m: 3e4, c_u_n_s_per_m: 160.0, bristles };
-    let brush = BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 };
-    let models = [
-        ("brush", FrictionModel::brush(&brush, 1e-4).unwrap()),
-        ("lugre", FrictionModel::lugre(&bristles, 1e-4).unwrap()),
-        ("modified_lugre", FrictionModel::modified_lugre(&bristles, 1e-4).unwrap()),
-        ("series", FrictionModel::series(&series, 1e-4).unwrap()),
-    ];
     let motion = motion();
     let mut group = c.benchmark_group("step_x1000");
-    for (name, model) in models {
+    for &kind in ModelKind::ALL {
+        let model = FrictionParameters::typical(kind).model(1e-4).unwrap();
         let mut state = model.rest();
-        group.bench_function(name, |b| {
+        group.bench_function(kind.name(), |b| {
             b.iter(|| {
                 for contact in &motion {
                     black_box(model.step(&mut state, black_box(contact)));

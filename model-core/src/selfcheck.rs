@@ -10,24 +10,26 @@ use crate::friction::lugre::{Lugre, LugreParameters, LugreState, Scheme};
 use crate::friction::lugre_patch::{
     LugrePatch, ModifiedLugrePatch, ModifiedPatchState, PatchParameters, PatchState,
 };
-use crate::friction::series::SeriesParameters;
 use crate::friction::stribeck::StribeckParameters;
-use crate::friction::{Contact, FrictionModel};
+use crate::friction::{Contact, FrictionParameters, ModelKind};
+
+/// Number of models checked: those of the registry, and others.
+pub const MODELS: usize = ModelKind::ALL.len() + OTHERS.len();
+
+/// What is checked beside the models of the registry.
+const OTHERS: [&str; 4] = ["lugre_backward_euler", "lugre_patch", "modified_patch", "brush_patch"];
 
 /// Names of the models checked, in the order of the hashes.
-pub const NAMES: [&str; MODELS] = [
-    "brush",
-    "lugre",
-    "lugre_backward_euler",
-    "modified_lugre",
-    "series",
-    "lugre_patch",
-    "modified_patch",
-    "brush_patch",
-];
-
-/// Number of models checked.
-pub const MODELS: usize = 8;
+pub const NAMES: [&str; MODELS] = {
+    let mut names = [""; MODELS];
+    let mut k = 0;
+    while k < MODELS {
+        let elements = ModelKind::ALL.len();
+        names[k] = if k < elements { ModelKind::ALL[k].name() } else { OTHERS[k - elements] };
+        k += 1;
+    }
+    names
+};
 
 /// Random steps of each model that the acceptance asks for.
 pub const STEPS: u32 = 10_000;
@@ -93,8 +95,11 @@ fn hash(steps: u32, seed: u32, mut step: impl FnMut(&Contact<f32>) -> f32) -> u6
     hash.0
 }
 
-fn element(model: Option<FrictionModel<f32>>, steps: u32, seed: u32) -> u64 {
-    let Some(model) = model else { return 0 };
+fn element(kind: ModelKind, steps: u32, seed: u32) -> u64 {
+    let typical = FrictionParameters::<f32>::typical(kind);
+    // Damping and viscous friction, which the assumed rubber has not, are worth checking too.
+    let parameters = typical.with("sigma1_n_s_per_m", 20.0).with("a2_s_per_m", 0.01);
+    let Ok(model) = parameters.model(STEP_S) else { return 0 };
     let mut state = model.rest();
     hash(steps, seed, |contact| model.step(&mut state, contact).force_n)
 }
@@ -108,18 +113,17 @@ pub fn run(steps: u32) -> [u64; MODELS] {
 /// model that could not be built or is not there.
 pub fn run_model(model: usize, steps: u32) -> u64 {
     let brush = BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 };
-    let series = SeriesParameters { k_u_n_per_m: 3e4, c_u_n_s_per_m: 160.0, bristles: BRISTLES };
-    match model {
-        0 => element(FrictionModel::brush(&brush, STEP_S).ok(), steps, 1),
-        1 => element(FrictionModel::lugre(&BRISTLES, STEP_S).ok(), steps, 2),
-        2 => Lugre::new(&BRISTLES, STEP_S).map_or(0, |model| {
+    let seed = model as u32 + 1;
+    if let Some(kind) = ModelKind::ALL.get(model) {
+        return element(*kind, steps, seed);
+    }
+    match model - ModelKind::ALL.len() {
+        0 => Lugre::new(&BRISTLES, STEP_S).map_or(0, |model| {
             let model = model.with_scheme(Scheme::BackwardEuler);
             let mut state = LugreState::default();
-            hash(steps, 3, |contact| model.step(&mut state, contact).force_n)
+            hash(steps, seed, |contact| model.step(&mut state, contact).force_n)
         }),
-        3 => element(FrictionModel::modified_lugre(&BRISTLES, STEP_S).ok(), steps, 4),
-        4 => element(FrictionModel::series(&series, STEP_S).ok(), steps, 5),
-        5 => {
+        1 => {
             let patch = PatchParameters {
                 sigma0_per_m: 2e3,
                 a2_s_per_m: 0.01,
@@ -129,16 +133,16 @@ pub fn run_model(model: usize, steps: u32) -> u64 {
             };
             LugrePatch::<f32, 20>::new(&patch, STEP_S).map_or(0, |model| {
                 let mut state = PatchState::default();
-                hash(steps, 6, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
+                hash(steps, seed, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
             })
         }
-        6 => ModifiedLugrePatch::<f32, 20>::new(&BRISTLES, 0.01, 3.0, STEP_S).map_or(0, |model| {
+        2 => ModifiedLugrePatch::<f32, 20>::new(&BRISTLES, 0.01, 3.0, STEP_S).map_or(0, |model| {
             let mut state = ModifiedPatchState::default();
-            hash(steps, 7, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
+            hash(steps, seed, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
         }),
-        7 => BrushPatch::<f32, 20>::new(&brush, 0.01, 3.0, STEP_S).map_or(0, |model| {
+        3 => BrushPatch::<f32, 20>::new(&brush, 0.01, 3.0, STEP_S).map_or(0, |model| {
             let mut state = BrushPatchState::default();
-            hash(steps, 8, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
+            hash(steps, seed, |contact| model.step(&mut state, contact, contact.sliding_speed_m_s))
         }),
         _ => 0,
     }

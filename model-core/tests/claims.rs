@@ -7,10 +7,12 @@ mod common;
 use common::bristles;
 use model_core::friction::lugre::Scheme as LugreScheme;
 use model_core::friction::lugre::{Lugre, LugreState, Passivity};
-use model_core::friction::lugre_patch::{ModifiedLugrePatch, ModifiedPatchState};
+use model_core::friction::lugre_patch::{
+    LugrePatch, ModifiedLugrePatch, ModifiedPatchState, PatchParameters, PatchState,
+};
 use model_core::friction::modified_lugre::{ModifiedLugre, ModifiedLugreState, Scheme};
 use model_core::friction::series::{Series, SeriesParameters, SeriesState};
-use model_core::friction::{Contact, stribeck::Stribeck};
+use model_core::friction::{Contact, FrictionParameters, ModelKind, stribeck::Stribeck};
 use proptest::prelude::*;
 
 /// Overshoot of the series element at constant speed and load, and its final force over F_N g.
@@ -91,6 +93,74 @@ fn the_printed_overshoot_is_made_by_the_lagged_step_alone() {
         let implicit = modified_overshoot(Scheme::Implicit, step);
         assert!(implicit.abs() < 1e-9, "implicit at {step} s: {implicit}");
     }
+}
+
+/// Deflection's peak over its steady value, less one, and the span of the second half of the run over that value.
+fn folded(v: f64) -> (f64, f64) {
+    let p = bristles(0.3, 1.0, 0.1, 2.0, 1e4);
+    assert_eq!(ModifiedLugre::new(&p, 1e-6).unwrap_err().name, "a0");
+    let kind = ModelKind::ModifiedLugreFold;
+    let p = FrictionParameters::new(kind, FrictionParameters::modified_lugre(&p).values()).unwrap();
+    let model = p.model(1e-6).unwrap();
+    assert!(model.warning().is_some());
+    let steady = 88.0 * model.stribeck().unwrap().coefficient(v) / 1e4;
+    let mut state = model.rest();
+    let (mut peak, mut low, mut high) = (0.0f64, f64::MAX, 0.0f64);
+    for k in 0..1_000_000 {
+        model.step(&mut state, &Contact::new(v, 88.0));
+        let u = state.deformation_m();
+        peak = peak.max(u);
+        if k > 500_000 {
+            (low, high) = (low.min(u), high.max(u));
+        }
+    }
+    (peak / steady - 1.0, (high - low) / steady)
+}
+
+#[test]
+fn outside_the_condition_the_modified_model_overshoots_or_never_settles() {
+    let (overshoot, span) = folded(0.2);
+    assert!((overshoot - 0.05).abs() < 0.01 && span < 1e-9, "0.2 m/s: {overshoot} {span}");
+    let (_, span) = folded(0.15);
+    assert!(span > 0.05, "0.15 m/s: a limit cycle of {span}");
+}
+
+#[test]
+fn where_there_is_one_root_the_folded_form_is_the_modified_model() {
+    let p = FrictionParameters::<f64>::typical(ModelKind::ModifiedLugre);
+    let (plain, folded) =
+        (p.model(1e-4).unwrap(), ModelKind::ModifiedLugreFold.build(p.values(), 1e-4).unwrap());
+    assert_eq!(folded.warning(), None);
+    let (mut a, mut b) = (plain.rest(), folded.rest());
+    for k in 0..3000 {
+        let contact = Contact::new(0.2 * (0.01 * f64::from(k)).sin(), 88.0);
+        let (x, y) = (plain.step(&mut a, &contact).force_n, folded.step(&mut b, &contact).force_n);
+        assert!((x - y).abs() < 1e-9 * 88.0, "{k}: {x} {y}");
+    }
+}
+
+#[test]
+fn the_literal_patch_is_lugres_in_steady_rolling_and_the_material_one_is_not() {
+    let p = bristles(0.5, 0.7, 0.5, 0.5, 3e4);
+    let (v, roll, length, load) = (0.06, 0.8, 0.1, 88.0);
+    let steady = |scheme| {
+        let patch = ModifiedLugrePatch::<f64, 40>::new(&p, length, roll, 1e-4).unwrap().with_scheme(scheme);
+        let mut state = ModifiedPatchState::default();
+        (0..20_000).map(|_| patch.step(&mut state, &Contact::new(v, load), roll)).last().unwrap()
+    };
+    let lugre = PatchParameters {
+        sigma0_per_m: 3e4 / load,
+        a2_s_per_m: 0.0,
+        stribeck: p.stribeck,
+        length_m: length,
+        largest_transport_speed_m_s: roll,
+    };
+    let lugre = LugrePatch::<f64, 40>::new(&lugre, 1e-4).unwrap();
+    let mut state = PatchState::default();
+    let lugre = (0..20_000).map(|_| lugre.step(&mut state, &Contact::new(v, load), roll)).last().unwrap();
+    assert!((steady(Scheme::Literal) / lugre - 1.0).abs() < 1e-6, "{} {lugre}", steady(Scheme::Literal));
+    // The material's speed is below v_r while it winds up: more friction, here by 2 %.
+    assert!(steady(Scheme::Implicit) / lugre > 1.015, "{} {lugre}", steady(Scheme::Implicit));
 }
 
 #[test]

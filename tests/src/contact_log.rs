@@ -1,19 +1,22 @@
 //! Runs a course on the contact rig and records what its sensors would read without noise.
 //!
-//! Step 25 µs; controllers every 250 µs; bridges stepped with the plant; every n-th step is a sample.
+//! Step 25 µs; controllers every 250 µs; bridges stepped with the plant; samples by a [`schedule`]
+//! of steps.
+//!
+//! [`schedule`]: crate::imperfections::Imperfections::schedule
 
 use crate::contact_force::{Contact, Touch};
 use crate::course::{Course, Motion, active};
 use crate::curve::Curve;
 use crate::drive::{Drive, DriveNumbers, SpeedLoop};
-use crate::filters::{BridgeFilter, Delay};
-use crate::laws::Laws;
-use crate::laws::drive::Units;
-use crate::laws::friction::{Slide, ThermalFade};
+use crate::filters::BridgeFilter;
+use crate::imperfections::Disturbance;
 use crate::laws::measurement::Drifting;
+use crate::laws::thermal::ThermalFade;
+use crate::laws::{Laws, Slide, Units};
 use crate::pressure::Pressure;
 use crate::random::Stream;
-use crate::rig::{Bridge, Friction, Rig};
+use crate::rig::{Friction, Rig};
 use crate::shadow::{Read, Residual, Shadow};
 
 /// Steps per second.
@@ -77,29 +80,28 @@ pub struct World<'a> {
 impl World<'_> {
     fn contact(&self, step_s: f64) -> Contact {
         let curve = Curve::new(self.friction, self.laws.bell_curve, self.laws.direction_asymmetry);
-        let branches: Vec<_> = self
+        let branches = self
             .laws
             .rubber_relaxation
-            .iter()
-            .flatten()
-            .map(|branch| {
-                let mut branch = *branch;
-                branch.stiffness_n_per_m *= self.friction.k_u_n_per_m;
-                branch
-            })
-            .collect();
+            .as_ref()
+            .map_or(Vec::new(), |law| law.beside(self.friction.k_u_n_per_m));
         Contact::new(self.friction, curve, step_s)
             .with_film(self.laws.viscous_film)
-            .with_block(&branches, self.laws.element_compliance.unwrap_or(0.0))
+            .with_block(&branches, self.laws.element_compliance.unwrap_or_default())
     }
 
-    /// Runs a course; `stream` draws what differs from log to log.
+    /// Runs a course and samples it at these steps; `stream` draws what differs from log to log.
     #[must_use]
-    pub fn run(&self, course: &Course, rate_hz: f64, stream: &mut Stream) -> CleanLog {
+    pub fn run(
+        &self,
+        course: &Course,
+        schedule: &[usize],
+        mut disturbance: Disturbance,
+        stream: &mut Stream,
+    ) -> CleanLog {
         let rig = self.rig;
         let h = 1.0 / STEPS_PER_S;
         let period = h * STEPS_PER_CONTROL as f64;
-        let every = (STEPS_PER_S / rate_hz).round() as usize;
         let steps = (course.duration_s * STEPS_PER_S).round() as usize;
         let mut laws = self.laws.clone();
         laws.begin_log(stream, course.duration_s);
@@ -126,21 +128,19 @@ impl World<'_> {
         let mut speed_loop =
             SpeedLoop::new(rig.inertia_kg_m2, self.bandwidth_rad_s, rig.rated_torque_nm, period);
         let mut contact = self.contact(h);
-        let ring = rig.friction_bridge.map(|bridge| {
-            laws.ring_resonance.map_or(bridge, |ring| Bridge {
-                mode_hz: ring.mode_hz,
-                damping_ratio: ring.damping_ratio,
-                ..bridge
-            })
-        });
-        let mut friction_bridge = BridgeFilter::new(ring.as_ref(), h, 0.0);
+        let bridge = rig.friction_bridge.as_ref();
+        let mut friction_bridge = match &laws.ring_resonance {
+            Some(ring) => BridgeFilter::ringing(bridge, ring, h, 0.0),
+            None => BridgeFilter::new(bridge, h, 0.0),
+        };
         let mut normal_bridge = BridgeFilter::new(rig.normal_bridge.as_ref(), h, pressure.normal_n());
-        let mut friction_delay = laws.friction_delay.map(|delay| Delay::new(delay, h, 0.0));
+        let mut friction_delay = laws.friction_delay.map(|law| law.running(h, 0.0));
         let mut surface = laws.thermal_fade.clone().unwrap_or_else(ThermalFade::average);
         let mut shadow = Shadow::new(self, h, pressure.torque_nm());
         let ambient = stream.uniform(20.0, 26.0);
 
-        let mut samples = Vec::with_capacity(steps / every + 1);
+        let mut samples = Vec::with_capacity(schedule.len());
+        let mut next_sample = schedule.iter().copied().peekable();
         let mut m2_command = 0.0;
         let mut ran_away = false;
         let mut segment = -1.0;
@@ -167,7 +167,10 @@ impl World<'_> {
                     }
                 };
             }
-            pressure.step(m1_command, &mut laws, drive.load_angle());
+            if n % STEPS_PER_CONTROL == 0 {
+                disturbance.push(pressure.normal_n(), drive.load_speed() * rig.friction_radius_m);
+            }
+            pressure.step(m1_command, &mut laws, drive.load_angle(), disturbance.kick_n());
             let slide = Slide {
                 step_s: h,
                 time_s: time,
@@ -181,6 +184,7 @@ impl World<'_> {
             surface.heat(&slide);
             let touch = Touch { root_speed_m_s: slide.root_speed_m_s, normal_n: slide.normal_n, scale };
             let torque = rig.friction_radius_m * contact.step(&touch);
+            shadow.scaled(torque, scale);
             drive.step(m2_command, torque, slide.normal_n);
 
             // Sensors, from the parts to the converter.
@@ -199,6 +203,9 @@ impl World<'_> {
                     Drifting::NormalZero => normal += drifted,
                     Drifting::NormalGain => normal *= 1.0 + drifted,
                 }
+            }
+            if let Some(law) = &laws.loose_plug {
+                friction *= law.factor(time);
             }
             if let Some(delay) = &mut friction_delay {
                 friction = delay.step(friction);
@@ -220,7 +227,8 @@ impl World<'_> {
                 friction_nm: friction,
             };
             shadow.step(&read, &drive);
-            if n % every == 0 {
+            if next_sample.next_if_eq(&n).is_some() {
+                let (friction_hum, normal_hum) = disturbance.hum(time);
                 let angle = eccentricity.map_or(drive.motor_angle(), |law| law.angle(drive.motor_angle()));
                 samples.push(Sample {
                     time_s: n as f64 / STEPS_PER_S,
@@ -231,9 +239,9 @@ impl World<'_> {
                     m2_torque_nm: read.m2_torque_nm,
                     m2_angle_rad: angle - origin,
                     m2_speed_rad_s: read_speed,
-                    normal_force_n: normal,
-                    friction_torque_nm: friction,
-                    surface_temperature_c: ambient + surface.layer_k(),
+                    normal_force_n: normal + normal_hum,
+                    friction_torque_nm: friction + friction_hum,
+                    surface_temperature_c: ambient + surface.surface_k(),
                 });
                 shadow.sample(&read);
             }

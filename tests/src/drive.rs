@@ -5,9 +5,12 @@
 //! Torque: command → first-order lag (what the drive reports) → the laws that the drive does not know.
 //! Left out: bearing friction as a set-valued law; the sign is smoothed over 0.005 rad/s.
 
-use crate::filters::{Delay, Lag};
-use crate::laws::Laws;
-use crate::laws::drive::{Coupling, Falling, Ripple, Uneven, Units, Yielding};
+use crate::filters::Lag;
+use crate::laws::bearing::{Falling, Offset, Uneven};
+use crate::laws::coupling::Coupling;
+use crate::laws::lateness::Late;
+use crate::laws::ripple::Ripple;
+use crate::laws::{Laws, Units, Yielding};
 
 /// Speed over which the sign of Coulomb friction turns.
 const TURN_RAD_S: f64 = 0.005;
@@ -36,9 +39,10 @@ pub struct Drive {
     step_s: f64,
     coupling: Option<Coupling>,
     lag: Lag,
-    delay: Option<Delay>,
+    late: Option<Late>,
     sag: Option<f64>,
-    offset: f64,
+    offset: Option<Offset>,
+    steps: u64,
     ripple: Option<Ripple>,
     uneven: Option<Uneven>,
     falling: Option<Falling>,
@@ -59,12 +63,13 @@ impl Drive {
             step_s,
             coupling: Coupling::joined(laws.shaft_torsion.as_ref(), laws.backlash.as_ref()),
             lag: Lag::new(numbers.lag_s, step_s, 0.0),
-            delay: laws.drive_delay.map(|delay| Delay::new(delay, step_s, 0.0)),
+            late: laws.drive_delay.map(|law| law.running(step_s, 0.0)),
             sag: laws.torque_sag,
-            offset: laws.torque_offset.unwrap_or(0.0),
+            offset: laws.torque_offset,
+            steps: 0,
             ripple: laws.m2_ripple.clone(),
-            uneven: laws.bearing_asymmetry.clone(),
-            falling: laws.bearing_stribeck.clone(),
+            uneven: laws.bearing_asymmetry,
+            falling: laws.bearing_stribeck,
             yielding: laws.presliding.clone(),
             thrust: laws.thrust_bearing.unwrap_or(0.0),
             motor_angle: angle,
@@ -115,32 +120,35 @@ impl Drive {
         let speed = self.motor_speed;
         let side = speed / speed.hypot(TURN_RAD_S * self.numbers.units.travel);
         let mut size = self.numbers.coulomb + self.thrust * normal_n;
-        let mut viscous = self.numbers.viscous;
+        let mut extra = 0.0;
         let mut direction = side;
         if let Some(yielding) = &mut self.yielding {
             size *= yielding.stronger;
-            direction = yielding.share(self.step_s * speed);
+            direction = yielding.hysteresis.step(self.step_s * speed);
         }
         if let Some(uneven) = &self.uneven {
-            size *= 1.0 + uneven.coulomb_share * side;
-            // Positive on both sides: the plain part is larger in such a bearing.
-            viscous += uneven.viscous.abs() * 1.2 + uneven.viscous * side;
+            let (factor, beside) = uneven.at(speed, side);
+            size *= factor;
+            extra = beside;
         }
         if let Some(falling) = &self.falling {
-            size += falling.extra / (1.0 + (speed / falling.speed).powi(2));
+            size += falling.at(speed);
         }
-        size * direction + viscous * speed
+        size * direction + self.numbers.viscous * speed + extra
     }
 
     /// One step: torque commanded, torque of the load, normal force on the disc.
     pub fn step(&mut self, command: f64, load: f64, normal_n: f64) {
         let reported = self.lag.step(command);
-        let mut shaft = self.delay.as_mut().map_or(reported, |delay| delay.step(reported));
+        let mut shaft = self.late.as_mut().map_or(reported, |late| late.step(reported));
+        let time_s = self.steps as f64 * self.step_s;
+        self.steps += 1;
         if let Some(sag) = self.sag {
             let reference = SAG_REFERENCE_RAD_S * self.numbers.units.travel;
             shaft *= 1.0 - sag * (self.motor_speed / reference).powi(2).min(2.0);
         }
-        shaft += self.offset + self.ripple.as_ref().map_or(0.0, |ripple| ripple.at(self.motor_angle));
+        shaft += self.offset.map_or(0.0, |offset| offset.at(time_s, self.motor_angle));
+        shaft += self.ripple.as_ref().map_or(0.0, |ripple| ripple.at(self.motor_angle));
         let drag = self.drag(normal_n);
         let (h, inertia) = (self.step_s, self.numbers.inertia);
         if let Some(coupling) = &self.coupling {

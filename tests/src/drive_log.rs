@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 use crate::contact_log::STEPS_PER_S;
 use crate::course::{Motion, Shape, active};
 use crate::drive::{Drive, DriveNumbers, SpeedLoop};
-use crate::laws::drive::Units;
-use crate::laws::{Laws, Setting};
+use crate::imperfections::Imperfections;
+use crate::laws::{Laws, Setting, Units};
 use crate::random::Stream;
 use crate::rig::Rig;
 use crate::scenario::{Form, GeneratedCase, Scenario};
@@ -118,19 +118,22 @@ fn run(
     laws: &Laws,
     list: &[(f64, Motion)],
     limit: f64,
+    schedule: &[usize],
     scenario: &Scenario,
     s: &mut Stream,
 ) -> Run {
     let h = 1.0 / STEPS_PER_S;
-    let every = (STEPS_PER_S / scenario.rate_hz).round() as usize;
     let steps = (scenario.duration_s * STEPS_PER_S).round() as usize;
     let travel = numbers.units.travel;
     let start_angle = s.phase() * travel;
     let origin = if s.chance(0.5) { start_angle } else { start_angle - s.uniform(-20.0, 20.0) * travel };
-    let mut drive = Drive::new(numbers, laws, h, start_angle);
+    let mut laws = laws.clone();
+    laws.begin_log(s, scenario.duration_s);
+    let mut drive = Drive::new(numbers, &laws, h, start_angle);
     let mut speed_loop =
         SpeedLoop::new(numbers.inertia, s.uniform(55.0, 85.0), limit, h * STEPS_PER_CONTROL as f64);
-    let mut rows = Vec::with_capacity(steps / every + 1);
+    let mut rows = Vec::with_capacity(schedule.len());
+    let mut next_sample = schedule.iter().copied().peekable();
     let (mut command, mut balance, mut torque, mut last_speed) = (0.0, 0.0, 0.0, 0.0);
     let mut squares = [0.0, 0.0];
     let mut ran_away = false;
@@ -166,7 +169,7 @@ fn run(
             squares[1] += (torque / count).powi(2);
             (balance, torque, last_speed) = (0.0, 0.0, speed);
         }
-        if n % every == 0 {
+        if next_sample.next_if_eq(&n).is_some() {
             rows.push((n as f64 / STEPS_PER_S, drive.reported_torque(), drive.motor_angle() - origin));
         }
     }
@@ -199,7 +202,14 @@ pub(crate) fn drive_case(scenario: &Scenario) -> GeneratedCase {
     let seed = if linear { !scenario.seed } else { scenario.seed };
     let rig = Rig::draw(seed);
     let units = if linear { Units::LINEAR } else { Units::ROTARY };
-    let setting = Setting { rig: &rig, rate_hz: scenario.rate_hz, greatest_normal_n: 0.0, units };
+    let setting = Setting {
+        rig: &rig,
+        rate_hz: scenario.rate_hz,
+        duration_s: scenario.duration_s,
+        greatest_normal_n: 0.0,
+        units,
+        family: scenario.laws,
+    };
     let laws = Laws::draw(&scenario.effects, seed, &setting);
     let numbers = DriveNumbers {
         inertia: rig.inertia_kg_m2 * units.torque / units.travel,
@@ -209,13 +219,16 @@ pub(crate) fn drive_case(scenario: &Scenario) -> GeneratedCase {
         units,
     };
     let noise = Noise::draw(seed, scenario.noise_factor);
+    let imperfections = Imperfections::draw(seed, scenario.imperfection, &noise, scenario.rate_hz);
     let mut texts = Vec::new();
     let mut residuals = Vec::new();
     for i in 0..3 {
         let list = course(&mut Stream::new(seed, &format!("course {i}")), &numbers, scenario.duration_s);
         let limit = rig.rated_torque_nm * units.torque;
         let mut s = Stream::new(seed, &format!("log {i}"));
-        let log = run(numbers, &laws, &list, limit, scenario, &mut s);
+        let mut instants = Stream::new(seed, &format!("instants {i}"));
+        let schedule = imperfections.schedule(scenario.rate_hz, scenario.duration_s, &mut instants);
+        let log = run(numbers, &laws, &list, limit, &schedule, scenario, &mut s);
         let mut s = Stream::new(seed, &format!("noise {i}"));
         texts.push(csv(&log.rows, scenario.form, &noise, units, &mut s));
         residuals.push(log.residual);
@@ -242,6 +255,11 @@ pub(crate) fn drive_case(scenario: &Scenario) -> GeneratedCase {
             noise_factor: scenario.noise_factor,
             baseline_kind: "drive".to_owned(),
             rig,
+            duration_s: scenario.duration_s,
+            plan: scenario.plan,
+            imperfections,
+            stick_slip: false,
+            law_names: laws.names(),
             friction: None,
             nominal: None,
             laws,

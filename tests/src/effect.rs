@@ -127,6 +127,12 @@ effects! {
     ThrustBearing, "thrust_bearing", Drive, false;
     /// Outside: M2's torque constant falls with speed.
     TorqueSag, "torque_sag", Drive, false;
+    /// Outside: µ wanders at random.
+    MuWander, "mu_wander", Friction, false;
+    /// Outside: the friction bridge loses part of its signal now and then.
+    LoosePlug, "loose_plug", Measurement, false;
+    /// Outside: friction follows the load only after some sliding.
+    LoadMemory, "load_memory", Friction, false;
 }
 
 impl Effect {
@@ -177,14 +183,36 @@ impl Effect {
             && !self.is_pair(other, Self::BearingAsymmetry, Self::TorqueOffset)
     }
 
-    /// Two nameable effects that can be told apart, by the seed.
+    /// Whether the paper's plan, three slides in one direction at two loads, can show it apart from the others.
+    #[must_use]
+    pub fn shows_in_the_papers_plan(self) -> bool {
+        matches!(
+            self,
+            Self::ElementCompliance
+                | Self::DiscAngle
+                | Self::FrictionDelay
+                | Self::RingResonance
+                | Self::EncoderEccentricity
+                | Self::M2Ripple
+                | Self::MainsHum
+        )
+    }
+
+    /// Every pair of nameable effects that can be told apart.
+    #[must_use]
+    pub fn pairs() -> Vec<[Self; 2]> {
+        let known = Self::known();
+        let with = |(i, one): (usize, &Self)| {
+            let others = known[i + 1..].iter().filter(|other| one.tells_apart_from(**other));
+            others.map(|other| [*one, *other]).collect::<Vec<_>>()
+        };
+        known.iter().enumerate().flat_map(with).collect()
+    }
+
+    /// One of these pairs, each as likely as the others, by the seed.
     #[must_use]
     pub fn random_pair(seed: u64) -> [Self; 2] {
-        let mut s = Stream::new(seed, "pair");
-        let known = Self::known();
-        let first = s.pick(&known);
-        let rest: Vec<Self> = known.into_iter().filter(|other| first.tells_apart_from(*other)).collect();
-        [first, s.pick(&rest)]
+        Stream::new(seed, "pair").pick(&Self::pairs())
     }
 }
 

@@ -3,14 +3,15 @@
 use std::fmt::Write as _;
 
 use crate::random::{Stream, rounded};
-use crate::rig::{Bridge, Friction, Rig, kind};
+use crate::rig::{Friction, Rig, kind};
 use crate::scenario::Base;
 
-/// The rig file; each number is off by `error` (relative standard deviation).
+/// The rig file; each number but the radius, the rated torque and the pulses is off by `error` (relative
+/// standard deviation).
 #[must_use]
 pub fn rig_toml(rig: &Rig, error: f64, s: &mut Stream) -> String {
     let mut off = |value: f64| {
-        let wrong = value * (1.0 + error * s.normal());
+        let wrong = value * (error * s.normal()).exp();
         if error > 0.0 { rounded(wrong, 4) } else { value }
     };
     let mut text = String::new();
@@ -25,19 +26,14 @@ pub fn rig_toml(rig: &Rig, error: f64, s: &mut Stream) -> String {
     let _ = writeln!(text, "\n[pressure]\npreload_n = {:?}", off(rig.preload_n));
     let _ = writeln!(text, "mode_hz = {:?}", off(rig.pressure_mode_hz));
     let _ = writeln!(text, "damping_ratio = {:?}", off(rig.pressure_damping));
-    bridge_table(&mut text, "friction_bridge", rig.friction_bridge.as_ref());
-    bridge_table(&mut text, "normal_bridge", rig.normal_bridge.as_ref());
-    text
-}
-
-fn bridge_table(text: &mut String, name: &str, bridge: Option<&Bridge>) {
-    if let Some(bridge) = bridge {
-        let _ = writeln!(
-            text,
-            "\n[{name}]\nmode_hz = {:?}\ndamping_ratio = {:?}\nlowpass_hz = {:?}",
-            bridge.mode_hz, bridge.damping_ratio, bridge.lowpass_hz
-        );
+    for (name, bridge) in [("friction_bridge", rig.friction_bridge), ("normal_bridge", rig.normal_bridge)] {
+        if let Some(bridge) = bridge {
+            let _ = writeln!(text, "\n[{name}]\nmode_hz = {:?}", off(bridge.mode_hz));
+            let _ = writeln!(text, "damping_ratio = {:?}", off(bridge.damping_ratio));
+            let _ = writeln!(text, "lowpass_hz = {:?}", off(bridge.lowpass_hz));
+        }
     }
+    text
 }
 
 /// The model file.

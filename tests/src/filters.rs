@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
+use crate::laws::measurement::Ring;
 use crate::rig::Bridge;
 
 /// First-order lag.
@@ -79,25 +80,44 @@ impl Mode {
 
 /// A bridge with its amplifier.
 #[derive(Debug, Clone)]
-pub struct BridgeFilter(Option<(Mode, Mode)>);
+pub struct BridgeFilter {
+    stages: Option<(Mode, Mode)>,
+    /// The other mode of a ring that is not round, and its share.
+    second: Option<(Mode, f64)>,
+}
 
 impl BridgeFilter {
     /// A bridge at rest at `start`; `None` passes everything.
     #[must_use]
     pub fn new(bridge: Option<&Bridge>, step_s: f64, start: f64) -> Self {
-        Self(bridge.map(|b| {
+        let stages = bridge.map(|b| {
             (
                 Mode::new(b.mode_hz, b.damping_ratio, step_s, start),
                 Mode::new(b.lowpass_hz, FRAC_1_SQRT_2, step_s, start),
             )
-        }))
+        });
+        Self { stages, second: None }
+    }
+
+    /// The friction bridge of a ring whose mode is another than stated, or two.
+    #[must_use]
+    pub fn ringing(bridge: Option<&Bridge>, ring: &Ring, step_s: f64, start: f64) -> Self {
+        let bridge =
+            bridge.map(|b| Bridge { mode_hz: ring.mode_hz, damping_ratio: ring.damping_ratio, ..*b });
+        let second_hz = ring.mode_hz * (1.0 + ring.split);
+        let second = (ring.second_share > 0.0)
+            .then(|| (Mode::new(second_hz, ring.damping_ratio, step_s, start), ring.second_share));
+        Self { second, ..Self::new(bridge.as_ref(), step_s, start) }
     }
 
     /// One step.
     pub fn step(&mut self, input: f64) -> f64 {
-        match &mut self.0 {
+        match &mut self.stages {
             Some((mode, lowpass)) => {
-                let strained = mode.step(input);
+                let mut strained = mode.step(input);
+                if let Some((second, share)) = &mut self.second {
+                    strained += *share * (second.step(input) - strained);
+                }
                 lowpass.step(strained)
             }
             None => input,

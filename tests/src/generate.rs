@@ -5,7 +5,8 @@ use crate::course::{Course, Limits, paper};
 use crate::curve::Curve;
 use crate::effect::Effect;
 use crate::files;
-use crate::laws::{Laws, Setting, drive::Units};
+use crate::imperfections::{Disturbance, Imperfections};
+use crate::laws::{Laws, Setting, Units};
 use crate::random::Stream;
 use crate::rig::{Friction, Rig, kind};
 use crate::scenario::{Base, Form, GeneratedCase, Plan, Scenario, ScenarioError};
@@ -22,10 +23,11 @@ const GREATEST_NORMAL_N: f64 = 105.0;
 /// # Errors
 /// Where the scenario asks for something that does not exist; see [`ScenarioError`].
 pub fn generate(scenario: &Scenario) -> Result<GeneratedCase, ScenarioError> {
-    check(scenario)?;
+    let scenario = scenario.with_plan_drawn();
+    check(&scenario)?;
     match scenario.form {
-        Form::Contact => Ok(contact_case(scenario)),
-        Form::Drive | Form::LinearStage => Ok(crate::drive_log::drive_case(scenario)),
+        Form::Contact => Ok(contact_case(&scenario)),
+        Form::Drive | Form::LinearStage => Ok(crate::drive_log::drive_case(&scenario)),
     }
 }
 
@@ -59,7 +61,7 @@ fn base(scenario: &Scenario) -> Base {
         return Base::Series;
     }
     match scenario.base {
-        Base::BySeed if Stream::new(scenario.seed, "base").chance(0.5) => Base::Series,
+        Base::BySeed if Stream::new(scenario.seed, "base").chance(0.8) => Base::Series,
         Base::BySeed => Base::Lugre,
         decided => decided,
     }
@@ -78,8 +80,14 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
     // The loads are sized for the plain curve, so that they are the same with an effect and without.
     let plain = Curve::new(&friction, None, None);
     let greatest = (SLIDING_TORQUE_NM / (rig.friction_radius_m * plain.peak())).min(GREATEST_NORMAL_N);
-    let setting =
-        Setting { rig: &rig, rate_hz: scenario.rate_hz, greatest_normal_n: greatest, units: Units::ROTARY };
+    let setting = Setting {
+        rig: &rig,
+        rate_hz: scenario.rate_hz,
+        duration_s: scenario.duration_s,
+        greatest_normal_n: greatest,
+        units: Units::ROTARY,
+        family: scenario.laws,
+    };
     let laws = Laws::draw(&scenario.effects, seed, &setting);
     let mut sizes = Stream::new(seed, "course limits");
     let limits = Limits {
@@ -95,7 +103,7 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
         bandwidth_rad_s: sizes.uniform(55.0, 85.0),
     };
     let courses: Vec<Course> = match scenario.plan {
-        Plan::Random => (0..3)
+        Plan::Random | Plan::Drawn => (0..3)
             .map(|i| {
                 let mut s = Stream::new(seed, &format!("course {i}"));
                 Course::draw(&mut s, limits, scenario.duration_s)
@@ -106,13 +114,19 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
             [10.0, 30.0, 120.0, 20.0].iter().map(|rpm| paper(*rpm, force(0.055), force(0.4))).collect()
         }
     };
+    let noise = Noise::draw(seed, scenario.noise_factor);
+    let imperfections = Imperfections::draw(seed, scenario.imperfection, &noise, scenario.rate_hz);
     let logs: Vec<CleanLog> = courses
         .iter()
         .enumerate()
-        .map(|(i, course)| world.run(course, scenario.rate_hz, &mut Stream::new(seed, &format!("log {i}"))))
+        .map(|(i, course)| {
+            let mut instants = Stream::new(seed, &format!("instants {i}"));
+            let schedule = imperfections.schedule(scenario.rate_hz, course.duration_s, &mut instants);
+            let disturbance = Disturbance::new(&imperfections, seed, i);
+            world.run(course, &schedule, disturbance, &mut Stream::new(seed, &format!("log {i}")))
+        })
         .collect();
 
-    let noise = Noise::draw(seed, scenario.noise_factor);
     let mut residuals: Vec<_> = logs.iter().map(|log| log.residual).collect();
     let samples: Vec<_> = logs.into_iter().map(|log| log.samples).collect();
     let clip = laws.adc_saturation.as_ref().map(|law| Clip::new(law, &samples));
@@ -158,6 +172,11 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
             noise_factor: scenario.noise_factor,
             baseline_kind: kind(nominal.base).to_owned(),
             rig,
+            stick_slip: friction.sticks_and_slips(),
+            law_names: laws.names(),
+            plan: scenario.plan,
+            duration_s: scenario.duration_s,
+            imperfections,
             friction: Some(friction),
             nominal: Some(nominal),
             laws,

@@ -1,6 +1,6 @@
 //! M1, lever, foil springs: from torque to normal force.
 //!
-//! ẍ + 2ζω ẋ + ω² (x + hard(x)) = ω² (gain·(τ + ripple(θ1) − lost(τ)) − preload + wobble),
+//! ẍ + 2ζω ẋ + ω² (x + hard(x)) = ω² (gain·(τ + ripple(θ1) − lost(τ)) − preload + wobble + bounce),
 //! F_N = max(0, x), θ1 = x/stiffness.
 
 use crate::filters::{Lag, Mode};
@@ -51,8 +51,8 @@ impl Pressure {
         self.force.max(0.0)
     }
 
-    /// One step under a torque command, with the effects of `laws`.
-    pub fn step(&mut self, command_nm: f64, laws: &mut Laws, disc_angle_rad: f64) {
+    /// One step under a torque command and the road's push, with the effects of `laws`.
+    pub fn step(&mut self, command_nm: f64, laws: &mut Laws, disc_angle_rad: f64, bounce_n: f64) {
         let mut torque = self.lag.step(command_nm);
         if let Some(law) = &mut laws.lever_hysteresis {
             torque -= law.lost(torque);
@@ -67,6 +67,6 @@ impl Pressure {
         if let Some(law) = &laws.disc_wobble {
             target += law.at(disc_angle_rad);
         }
-        self.force = self.mode.step(target);
+        self.force = self.mode.step(target + bounce_n);
     }
 }

@@ -8,6 +8,11 @@ use serde::Serialize;
 use crate::random::{Stream, rounded};
 use crate::scenario::Base;
 
+/// Sliding speed at 10 rpm on a radius of 0.06 m.
+const SLOW_M_S: f64 = 10.0 / 60.0 * std::f64::consts::TAU * 0.06;
+/// Normal force at which stick-slip is judged.
+const MIDDLING_N: f64 = 88.0;
+
 /// A bridge amplifier: the sensor's own mode, then a second-order Butterworth low-pass.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bridge {
@@ -147,9 +152,11 @@ impl Friction {
         let sigma0 = s.log_uniform(1.2e7, 2.5e7);
         let sigma1 = if s.chance(0.5) { 0.0 } else { s.uniform(50.0, 500.0) };
         let k_u = s.log_uniform(2.2e4, 4.0e4);
-        let c_u = s.log_uniform(140.0, 260.0);
+        // A third of the rubber contacts stick and slip: a block is steady where its damping beats the fall of
+        // the curve (ratio 1).
+        let damping_ratio = s.log_uniform(0.5, 3.0);
         let plain = base == Base::ModifiedLugre;
-        Self {
+        let mut friction = Self {
             base,
             sigma0_n_per_m: rounded(sigma0, 4),
             sigma1_n_s_per_m: if base == Base::Lugre { rounded(sigma1, 4) } else { 0.0 },
@@ -159,26 +166,43 @@ impl Friction {
             v0_m_s: rounded(v0, 4),
             delta: if plain { 0.5 } else { rounded(delta, 4) },
             k_u_n_per_m: rounded(k_u, 4),
-            c_u_n_s_per_m: rounded(c_u, 4),
-        }
+            c_u_n_s_per_m: 0.0,
+        };
+        friction.c_u_n_s_per_m = rounded(damping_ratio * friction.steepest_fall(), 4);
+        friction
     }
 
-    /// What a user would have in the model file: each number somewhat off, the exponent right.
+    /// F_N |g′| at 10 rpm under 88 N, N·s/m: the block's damping below which it sticks and slips there.
+    #[must_use]
+    pub fn steepest_fall(&self) -> f64 {
+        let ratio = SLOW_M_S / self.v0_m_s;
+        let power = ratio.powf(self.delta);
+        MIDDLING_N * self.a1 * self.delta * power / SLOW_M_S * (-power).exp()
+    }
+
+    /// Whether a block sticks and slips at 10 rpm.
+    #[must_use]
+    pub fn sticks_and_slips(&self) -> bool {
+        self.base == Base::Series && self.c_u_n_s_per_m < self.steepest_fall()
+    }
+
+    /// What a user would have in the model file: each number up to 30 % off, evenly in the logarithm, the
+    /// exponent right.
     #[must_use]
     pub fn nominal(&self, seed: u64) -> Self {
         let mut s = Stream::new(seed, "nominal");
-        let mut off = |value: f64, share: f64| rounded(s.about(value, share), 3);
+        let mut off = |value: f64| rounded(value * s.log_uniform(1.0 / 1.3, 1.3), 3);
         Self {
             base: self.base,
-            sigma0_n_per_m: off(self.sigma0_n_per_m, 0.3),
-            sigma1_n_s_per_m: off(self.sigma1_n_s_per_m, 0.3),
-            a0: off(self.a0, 0.12),
-            a1: off(self.a1, 0.2),
-            a2_s_per_m: off(self.a2_s_per_m, 0.4),
-            v0_m_s: off(self.v0_m_s, 0.25),
+            sigma0_n_per_m: off(self.sigma0_n_per_m),
+            sigma1_n_s_per_m: off(self.sigma1_n_s_per_m),
+            a0: off(self.a0),
+            a1: off(self.a1),
+            a2_s_per_m: off(self.a2_s_per_m),
+            v0_m_s: off(self.v0_m_s),
             delta: self.delta,
-            k_u_n_per_m: off(self.k_u_n_per_m, 0.2),
-            c_u_n_s_per_m: off(self.c_u_n_s_per_m, 0.3),
+            k_u_n_per_m: off(self.k_u_n_per_m),
+            c_u_n_s_per_m: off(self.c_u_n_s_per_m),
         }
     }
 }

@@ -4,13 +4,17 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use serde::Serialize;
 
 use crate::effect::Effect;
+use crate::imperfections::Imperfection;
+use crate::laws::LawFamily;
+use crate::random::Stream;
 
 /// Friction model behind the log where no effect changes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Base {
-    /// LuGre or series element, by the seed.
+    /// Series element (four of five) or LuGre, by the seed.
     #[default]
     BySeed,
     /// LuGre bristles.
@@ -34,7 +38,8 @@ pub enum Form {
 }
 
 /// Which motions and loads are run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Plan {
     /// A shuffled deck of dwells, slides, ramps, sines, reversals, load changes and torque parts.
     #[default]
@@ -42,6 +47,9 @@ pub enum Plan {
     /// Speed step at low load, then load step (the paper's figures 18 to 21): three speeds to train
     /// on, the fourth held out. Contact logs only; 8 s each.
     Paper,
+    /// By the seed: decks of 20 s (six of ten), 10 s (two) and 60 s (one), or the paper's course (one) where that
+    /// can show the effects.
+    Drawn,
 }
 
 /// A case to generate.
@@ -61,16 +69,20 @@ pub struct Scenario {
     pub form: Form,
     /// Which motions are run.
     pub plan: Plan,
-    /// Length of each log (random plan).
+    /// Length of each log (random plan; 20 s are the paper's 8 s, and drawn where the plan is).
     pub duration_s: f64,
     /// Relative error (standard deviation) of the rig file against the true rig.
     pub rig_file_error: f64,
+    /// Laws behind the effects.
+    pub laws: LawFamily,
+    /// How imperfect the logs are.
+    pub imperfection: Imperfection,
     /// Whether the log has a surface temperature.
     pub temperature_sensor: bool,
 }
 
 impl Scenario {
-    /// These effects, two training logs and one held out of 20 s at 1 kHz.
+    /// These effects, two training logs and one held out of 20 s at 1 kHz; a rig file 5 % off, mild imperfections.
     #[must_use]
     pub fn new(effects: &[Effect], seed: u64) -> Self {
         Self {
@@ -82,9 +94,29 @@ impl Scenario {
             form: Form::default(),
             plan: Plan::default(),
             duration_s: 20.0,
-            rig_file_error: 0.0,
+            rig_file_error: 0.05,
+            laws: LawFamily::default(),
+            imperfection: Imperfection::default(),
             temperature_sensor: false,
         }
+    }
+
+    /// The same with nothing left to draw about its plan.
+    #[must_use]
+    pub fn with_plan_drawn(&self) -> Self {
+        if self.plan != Plan::Drawn {
+            return self.clone();
+        }
+        let draw = Stream::new(self.seed, "plan").uniform(0.0, 1.0);
+        let papers =
+            self.form == Form::Contact && self.effects.iter().all(|effect| effect.shows_in_the_papers_plan());
+        let (plan, duration_s) = match draw {
+            d if d < 0.2 => (Plan::Random, 10.0),
+            d if d < 0.3 => (Plan::Random, 60.0),
+            d if d < 0.4 && papers => (Plan::Paper, 8.0),
+            _ => (Plan::Random, 20.0),
+        };
+        Self { plan, duration_s, ..self.clone() }
     }
 }
 

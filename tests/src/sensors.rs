@@ -1,17 +1,19 @@
 //! From clean samples to what a log holds: noise, converters, encoder counts.
 //!
 //! Noise is white and normal, per sample, with a size drawn per case around that of good bridges and
-//! drives; converters have 16 bits, encoders 480 000 counts a turn. A converter that is out of range
-//! clips after the noise, as a real one does.
+//! drives; converters have 16 bits, encoders 480 000 counts a turn. Order: amplifier (it may clip), noise,
+//! converter (so may it).
 
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
 use crate::contact_log::Sample;
-use crate::laws::measurement::{Clipped, Saturation};
+use crate::laws::clipping::{Clipped, Edge, Saturation};
 use crate::random::Stream;
 
+/// Share of its limit by which an overdriven amplifier reads too much just after.
+const OVERDRIVE: f64 = 0.2;
 /// Counts per radian of both encoders.
 const COUNTS_PER_RAD: f64 = 480_000.0 / std::f64::consts::TAU;
 
@@ -52,45 +54,91 @@ impl Noise {
     }
 }
 
-/// Clipping levels of a case.
+/// Clipping of a case.
 #[derive(Debug, Clone, Copy)]
 pub struct Clip {
     channel: Clipped,
-    level: f64,
+    edge: Edge,
+    low: f64,
+    high: f64,
+    /// What clipping holds back, where the amplifier leaves its rails late.
+    held: f64,
+    last_s: f64,
 }
 
 impl Clip {
-    /// The level that leaves the stated share of these samples below it.
+    /// The limits that leave the stated share of these samples within them.
     #[must_use]
     pub fn new(saturation: &Saturation, logs: &[Vec<Sample>]) -> Self {
-        let mut sizes: Vec<f64> = logs
-            .iter()
-            .flatten()
-            .map(|sample| match saturation.channel {
-                Clipped::Friction => sample.friction_torque_nm.abs(),
-                Clipped::Normal => sample.normal_force_n,
-            })
-            .collect();
+        let value = |sample: &Sample| match saturation.channel {
+            Clipped::Friction => sample.friction_torque_nm,
+            Clipped::Normal => sample.normal_force_n,
+        };
+        let all: Vec<f64> = logs.iter().flatten().map(value).collect();
+        // One rail: on the side with the more samples beyond the middle of the sizes.
+        let mut sizes: Vec<f64> = all.iter().map(|value| value.abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        let index = (saturation.unclipped_share * sizes.len() as f64) as usize;
-        Self { channel: saturation.channel, level: sizes.get(index).copied().unwrap_or(0.0) }
+        let at = |share: f64| sizes.get((share * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
+        let (level, middle) = (at(saturation.unclipped_share), at(0.5));
+        let (above, below) = all
+            .iter()
+            .filter(|value| value.abs() > middle)
+            .fold((0, 0), |(up, down), value| if *value > 0.0 { (up + 1, down) } else { (up, down + 1) });
+        let one = saturation.edge == Edge::OneRail;
+        Self {
+            channel: saturation.channel,
+            edge: saturation.edge,
+            low: if one && above >= below { f64::NEG_INFINITY } else { -level },
+            high: if one && above < below { f64::INFINITY } else { level },
+            held: 0.0,
+            last_s: 0.0,
+        }
     }
 
-    /// A sample's friction torque and normal force as the converter gives them.
-    #[must_use]
-    pub fn read(&self, friction_nm: f64, normal_n: f64) -> (f64, f64) {
+    fn amplified(&mut self, value: f64, time_s: f64) -> f64 {
+        let elapsed = time_s - std::mem::replace(&mut self.last_s, time_s);
+        match self.edge {
+            Edge::Converter => value,
+            Edge::Rails | Edge::OneRail => value.clamp(self.low, self.high),
+            Edge::Soft { power } => {
+                value / (1.0 + (value / self.high).abs().powf(2.0 * power)).powf(0.5 / power)
+            }
+            Edge::Recovery { time_s } => {
+                let inside = value.clamp(self.low, self.high);
+                self.held =
+                    if inside == value { self.held * (-elapsed / time_s).exp() } else { OVERDRIVE * inside };
+                (value + self.held).clamp(self.low, self.high)
+            }
+        }
+    }
+
+    /// A sample's friction torque and normal force as the amplifier gives them.
+    pub fn amplifier(&mut self, sample: &Sample) -> (f64, f64) {
+        let (friction, normal) = (sample.friction_torque_nm, sample.normal_force_n);
         match self.channel {
-            Clipped::Friction => (friction_nm.clamp(-self.level, self.level), normal_n),
-            Clipped::Normal => (friction_nm, normal_n.min(self.level)),
+            Clipped::Friction => (self.amplified(friction, sample.time_s), normal),
+            Clipped::Normal => (friction, self.amplified(normal, sample.time_s)),
+        }
+    }
+
+    /// The same with its noise, as the converter gives them.
+    #[must_use]
+    pub fn converter(&self, friction_nm: f64, normal_n: f64) -> (f64, f64) {
+        match (self.edge, self.channel) {
+            (Edge::Converter, Clipped::Friction) => (friction_nm.clamp(self.low, self.high), normal_n),
+            (Edge::Converter, Clipped::Normal) => (friction_nm, normal_n.clamp(self.low, self.high)),
+            _ => (friction_nm, normal_n),
         }
     }
 
     /// RMS of what is lost of friction torque and normal force in a log.
     #[must_use]
     pub fn lost(&self, samples: &[Sample]) -> (f64, f64) {
+        let mut clip = *self;
         let (mut friction, mut normal) = (0.0, 0.0);
         for sample in samples {
-            let (f, n) = self.read(sample.friction_torque_nm, sample.normal_force_n);
+            let (f, n) = clip.amplifier(sample);
+            let (f, n) = self.converter(f, n);
             friction += (sample.friction_torque_nm - f).powi(2);
             normal += (sample.normal_force_n - n).powi(2);
         }
@@ -118,16 +166,21 @@ pub fn contact_csv(
     s: &mut Stream,
 ) -> String {
     let mut text = String::with_capacity(samples.len() * 110 + 200);
+    let mut clip = clip.copied();
     text.push_str(
         "time_s,m1_torque_ref_nm,m1_torque_nm,m1_angle_rad,m2_torque_ref_nm,m2_torque_nm,m2_angle_rad,\
          m2_speed_rad_s,normal_force_n,friction_torque_nm",
     );
     text.push_str(if temperature { ",surface_temperature_c\n" } else { "\n" });
     for sample in samples {
-        let mut friction = sample.friction_torque_nm + noise.friction_nm * s.normal();
-        let mut normal = sample.normal_force_n + noise.normal_n * s.normal();
-        if let Some(clip) = clip {
-            (friction, normal) = clip.read(friction, normal);
+        let (mut friction, mut normal) = (sample.friction_torque_nm, sample.normal_force_n);
+        if let Some(clip) = &mut clip {
+            (friction, normal) = clip.amplifier(sample);
+        }
+        friction += noise.friction_nm * s.normal();
+        normal += noise.normal_n * s.normal();
+        if let Some(clip) = &clip {
+            (friction, normal) = clip.converter(friction, normal);
         }
         let jitter = noise.angle_counts / COUNTS_PER_RAD;
         let row = [

@@ -42,6 +42,9 @@ pub struct Residual {
     pub normal_signal_n: f64,
     /// RMS torque of M2.
     pub drive_signal_nm: f64,
+    /// RMS of what the factor on µ takes from the friction torque or adds to it: unlike what is left open
+    /// loop, it does not count where a slip merely comes at another moment.
+    pub factor_nm: f64,
 }
 
 /// The baseline beside the rig.
@@ -66,6 +69,7 @@ pub struct Shadow {
     speed: f64,
     drive_squares: [f64; 2],
     windows: f64,
+    factor: [f64; 2],
 }
 
 impl Shadow {
@@ -95,7 +99,14 @@ impl Shadow {
             speed: 0.0,
             drive_squares: [0.0; 2],
             windows: 0.0,
+            factor: [0.0; 2],
         }
+    }
+
+    /// Notes the true friction torque of a step and the factor on µ in it.
+    pub fn scaled(&mut self, torque_nm: f64, factor: f64) {
+        self.factor[0] += (torque_nm * (1.0 - 1.0 / factor)).powi(2);
+        self.factor[1] += 1.0;
     }
 
     /// Follows the rig by one step.
@@ -143,6 +154,7 @@ impl Shadow {
             friction_signal_nm: rms(self.squares[2], self.samples),
             normal_signal_n: rms(self.squares[3], self.samples),
             drive_signal_nm: rms(self.drive_squares[1], self.windows),
+            factor_nm: rms(self.factor[0], self.factor[1]),
         }
     }
 }

@@ -1,6 +1,8 @@
 //! The diagnosis on logs of the independent generator: one case for each kind of answer. How often it is right over all
 //! effects, laws and rigs is counted by `cargo rig trials`; these are the cases that must not be lost on the way.
 
+#![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
+
 use host_sim::files::log::Log;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
@@ -10,7 +12,8 @@ use rig_tests::{Base, Effect, Scenario, generate};
 fn answer(effects: &[Effect], seed: u64, base: Base) -> Written {
     let case = generate(&Scenario { base, ..Scenario::new(effects, seed) }).unwrap();
     let log = |name: &str, text: &String| Log::parse_csv(name, text.as_bytes()).unwrap();
-    let train: Vec<Log> = case.train.iter().enumerate().map(|(i, text)| log(&format!("train{i}"), text)).collect();
+    let train: Vec<Log> =
+        case.train.iter().enumerate().map(|(i, text)| log(&format!("train{i}"), text)).collect();
     let holdout = log("holdout", &case.holdout);
     let rig = RigFile::parse("rig", &case.rig_toml).unwrap();
     let model = ModelFile::parse("model", &case.model_toml).unwrap();
@@ -77,6 +80,10 @@ fn a_training_log_is_no_held_out_log() {
     let log = Log::parse_csv("same.csv", case.train[0].as_bytes()).unwrap();
     let rig = RigFile::parse("rig", &case.rig_toml).unwrap();
     let model = ModelFile::parse("model", &case.model_toml).unwrap();
-    let refused = diagnose(&[log.clone()], &[log], &rig, &model, &|| 0.0, &|_| ()).map(|_| ()).unwrap_err().to_string();
+    let refused =
+        diagnose(std::slice::from_ref(&log), std::slice::from_ref(&log), &rig, &model, &|| 0.0, &|_| ())
+            .map(|_| ())
+            .unwrap_err()
+            .to_string();
     assert!(refused.contains("is the same log as same.csv of --train"), "{refused}");
 }

@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use rig_tests::{
-    Base, Effect, Form, GeneratedCase, Plan, Scenario, ScenarioError, effect::Subsystem, generate,
+    Base, Effect, Form, GeneratedCase, Imperfection, Plan, Scenario, ScenarioError, effect::Subsystem,
+    generate,
 };
 
 /// A CSV log as columns.
@@ -86,8 +87,9 @@ fn each_effect_changes_the_signals_of_its_subsystem_well_beyond_noise() {
                 .iter()
                 .map(|(name, sigma)| rms_between(with.column(name), without.column(name)) / sigma)
                 .fold(0.0, f64::max);
-            // Three times the standard deviation of the noise of a single sample, in every log.
-            assert!(most > 3.0, "{} log {log}: {most:.1} times the noise", effect.id());
+            // Twice the standard deviation of the noise of a single sample as RMS, in every log: weak effects are
+            // 2 % of a channel whose noise is 0.4 to 0.7 %.
+            assert!(most > 2.0, "{} log {log}: {most:.1} times the noise", effect.id());
         }
     }
 }
@@ -105,7 +107,7 @@ fn each_drive_effect_changes_the_torque_of_a_drive_log_well_beyond_noise() {
             let sigma = with.truth.noise.m2_torque_nm * unit;
             for (with, without) in logs(&with).iter().zip(&logs(&without)) {
                 let change = rms_between(with.column(name), without.column(name)) / sigma;
-                assert!(change > 3.0, "{form:?} {}: {change:.1} times the noise", effect.id());
+                assert!(change > 2.0, "{form:?} {}: {change:.1} times the noise", effect.id());
             }
         }
     }
@@ -147,6 +149,7 @@ fn columns_are_complete_and_time_is_regular_at_every_rate() {
             rate_hz,
             duration_s: 3.0,
             temperature_sensor: true,
+            imperfection: Imperfection::None,
             ..Scenario::new(&[Effect::DiscAngle], 3)
         })
         .unwrap();
@@ -246,8 +249,8 @@ fn the_model_file_is_near_the_truth_but_not_the_truth() {
     let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&[], 11) }).unwrap();
     let (truth, nominal) = (case.truth.friction.unwrap(), case.truth.nominal.unwrap());
     assert_ne!(truth, nominal);
-    assert!((nominal.a0 / truth.a0 - 1.0).abs() < 0.13);
-    assert!((nominal.sigma0_n_per_m / truth.sigma0_n_per_m - 1.0).abs() < 0.31);
+    let within = |nominal: f64, truth: f64| (nominal / truth).ln().abs() < 1.31_f64.ln();
+    assert!(within(nominal.a0, truth.a0) && within(nominal.sigma0_n_per_m, truth.sigma0_n_per_m));
 }
 
 #[test]
@@ -286,4 +289,62 @@ fn there_are_27_names_and_each_is_found_by_its_id() {
         let [one, other] = Effect::random_pair(seed);
         assert!(one.tells_apart_from(other) && one.is_known() && other.is_known());
     }
+}
+
+#[test]
+fn strong_imperfections_leave_out_rows_and_shift_instants_and_mild_ones_are_below_the_noise() {
+    let of = |imperfection| {
+        let scenario = Scenario { imperfection, duration_s: 6.0, ..Scenario::new(&[], 4) };
+        let case = generate(&scenario).unwrap();
+        (case.truth.imperfections, case.truth.noise, logs(&case))
+    };
+    let (_, _, perfect) = of(Imperfection::None);
+    let (numbers, _, strong) = of(Imperfection::Strong);
+    assert!(numbers.friction_hum_nm > 0.0 && numbers.bounce_share > 0.0);
+    for (perfect, strong) in perfect.iter().zip(&strong) {
+        let (all, kept) = (perfect.column("time_s"), strong.column("time_s"));
+        assert!(
+            kept.len() < all.len() - 3 && kept.len() > all.len() * 9 / 10,
+            "{} of {}",
+            kept.len(),
+            all.len()
+        );
+        let steps: Vec<f64> = kept.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        // Eight rows missing at most, each instant a third of a period off at most.
+        assert!(steps.iter().all(|step| (0.3e-3..9.8e-3).contains(step)));
+        assert!(steps.iter().any(|step| *step > 1.9e-3), "rows are missing");
+        assert!(steps.iter().filter(|step| (*step - 1e-3).abs() > 2e-5).count() > steps.len() / 10, "jitter");
+    }
+    for seed in 0..20 {
+        let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&[], seed) }).unwrap();
+        let (mild, noise) = (case.truth.imperfections, case.truth.noise);
+        assert!(
+            mild.friction_hum_nm < noise.friction_nm && mild.normal_hum_n < noise.normal_n,
+            "seed {seed}"
+        );
+    }
+}
+
+#[test]
+fn an_amplifier_clips_before_the_noise_and_a_converter_after_it() {
+    let mut seen = std::collections::BTreeSet::new();
+    for seed in 0..40 {
+        let case =
+            generate(&Scenario { duration_s: 3.0, ..Scenario::new(&[Effect::AdcSaturation], seed) }).unwrap();
+        let law = case.truth.law_names["adc_saturation"].clone();
+        let laws = serde_json::to_value(&case.truth.laws).unwrap();
+        if laws["adc_saturation"]["channel"] != "friction" || !["rails", "converter"].contains(&law.as_str())
+        {
+            continue;
+        }
+        let logs = logs(&case);
+        let values: Vec<f64> =
+            logs.iter().flat_map(|log| log.column("friction_torque_nm")).copied().collect();
+        let top = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let at_top = values.iter().filter(|value| value.abs() == top).count() as f64 / values.len() as f64;
+        // A tenth to a third of the samples clip; behind the noise hardly two of the largest are equal.
+        assert_eq!(law == "converter", at_top > 0.05, "seed {seed} {law}: {at_top}");
+        seen.insert(law);
+    }
+    assert_eq!(seen.len(), 2, "{seen:?}");
 }

@@ -10,12 +10,7 @@ use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
 use host_sim::lockstep::{Setup, run};
-use model_core::friction::Contact;
-use model_core::friction::brush::BrushParameters;
-use model_core::friction::lugre::LugreParameters;
-use model_core::friction::series::SeriesParameters;
-use model_core::friction::stribeck::StribeckParameters;
-use model_core::friction::{FrictionModel, FrictionState};
+use model_core::friction::{Contact, FrictionModel, FrictionParameters, FrictionState, ModelKind};
 use model_core::real::Real;
 
 const RADIUS_M: f64 = 0.06;
@@ -23,58 +18,17 @@ const PERIOD_S: f64 = 1e-4;
 /// Steps of the reference in a control period.
 const FINE: usize = 50;
 
-fn bristles<T: Real>() -> LugreParameters<T> {
-    LugreParameters {
-        sigma0_n_per_m: T::from_f64(1.76e7),
-        sigma1_n_s_per_m: T::ZERO,
-        a2_s_per_m: T::ZERO,
-        stribeck: StribeckParameters {
-            a0: T::from_f64(0.5),
-            a1: T::from_f64(0.7),
-            v0_m_s: T::from_f64(0.5),
-            delta: T::HALF,
-            theta: T::ONE,
-        },
-    }
+fn model<T: Real>(kind: ModelKind, step_s: f64) -> FrictionModel<T> {
+    FrictionParameters::typical(kind).model(T::from_f64(step_s)).unwrap()
 }
 
-fn model<T: Real>(kind: &str, step_s: f64) -> FrictionModel<T> {
-    let step = T::from_f64(step_s);
-    let made = match kind {
-        "brush" => {
-            let p = BrushParameters {
-                c_n_per_m: T::from_f64(3e4),
-                mu_s: T::from_f64(1.2),
-                mu_c: T::from_f64(0.8),
-            };
-            FrictionModel::brush(&p, step)
-        }
-        "lugre" => FrictionModel::lugre(&bristles(), step),
-        "modified_lugre" => FrictionModel::modified_lugre(&bristles(), step),
-        _ => {
-            let p = SeriesParameters {
-                k_u_n_per_m: T::from_f64(3e4),
-                c_u_n_s_per_m: T::from_f64(160.0),
-                bristles: bristles(),
-            };
-            FrictionModel::series(&p, step)
-        }
-    };
-    made.unwrap()
-}
-
-fn file(kind: &str) -> ModelFile {
-    let bristles = "sigma0_n_per_m = 1.76e7\na0 = 0.5\na1 = 0.7\nv0_m_s = 0.5\ndelta = 0.5\n";
-    let parameters = match kind {
-        "brush" => "c_n_per_m = 3e4\nmu_s = 1.2\nmu_c = 0.8\n".to_owned(),
-        "series" => format!("{bristles}k_u_n_per_m = 3e4\nc_u_n_s_per_m = 160.0\n"),
-        _ => bristles.to_owned(),
-    };
-    ModelFile::parse(kind, &format!("kind = \"{kind}\"\n[parameters]\n{parameters}")).unwrap()
+fn file(kind: ModelKind) -> ModelFile {
+    let numbers: Vec<(&str, f64)> = kind.parameters().iter().map(|spec| (spec.name, spec.typical)).collect();
+    ModelFile::new(kind.name(), kind, &numbers).unwrap()
 }
 
 /// Speed (m/s) and normal force (N) of the contact at every period.
-fn motion(experiment: &str, kind: &str) -> Vec<(f64, f64)> {
+fn motion(experiment: &str, kind: ModelKind) -> Vec<(f64, f64)> {
     let experiment = ExperimentFile::named_or_read(experiment, &[]).unwrap();
     let rig = RigFile::assumed_rig(&[]).unwrap();
     let model = file(kind);
@@ -104,7 +58,7 @@ fn period<T: Real>(
     force
 }
 
-fn nrmse(kind: &str, experiment: &str) -> f64 {
+fn nrmse(kind: ModelKind, experiment: &str) -> f64 {
     let motion = motion(experiment, kind);
     let single = model::<f32>(kind, PERIOD_S);
     let fine = model::<f64>(kind, PERIOD_S / FINE as f64);
@@ -121,9 +75,10 @@ fn nrmse(kind: &str, experiment: &str) -> f64 {
 
 #[test]
 fn every_model_in_f32_is_within_a_thousandth_of_f64_on_its_own_motion() {
-    for kind in ["brush", "lugre", "modified_lugre", "series"] {
+    for &kind in ModelKind::ALL {
         for experiment in ["fig18", "fig19", "fig20", "fig21"] {
             let found = nrmse(kind, experiment);
+            let kind = kind.name();
             println!("{kind} {experiment}: {found:.2e}");
             assert!(found < 1e-3, "{kind} on {experiment}: {found}");
         }

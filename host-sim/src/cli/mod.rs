@@ -12,6 +12,7 @@ mod monitor;
 mod port;
 mod predict;
 mod record;
+mod rivals;
 mod run;
 mod settings;
 mod simulate;
@@ -71,6 +72,7 @@ commands! {
     Diagnose(diagnose::Diagnose),
     Simulate(simulate::Simulate),
     Trials(trials::Trials),
+    Rivals(rivals::Rivals),
     Record(record::RecordArgs),
     Run(run::Run),
     Monitor(monitor::Monitor),

@@ -67,6 +67,9 @@ impl Simulate {
         for id in left_out(&model) {
             eprintln!("rig: {}: extension {id} does not act on friction itself: left out", model.source);
         }
+        if let Some(warning) = model.friction_model(PERIOD_S)?.warning() {
+            eprintln!("rig: {}: {warning}", model.source);
+        }
         let mut output = OutputDir::new(&self.out)?;
         let started = Instant::now();
         match &experiment.study {

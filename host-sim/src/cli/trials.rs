@@ -8,19 +8,27 @@ use std::process::Command;
 
 use crate::input_error::InputError;
 
-/// Hide effects in simulated logs, diagnose them, print the confusion table
+/// Hide effects in simulated logs, diagnose them, print how often the answer is right
 #[derive(clap::Args, Debug)]
 #[command(after_long_help = "\
 Examples:
-  rig trials --seeds 2
-  rig trials --seeds 5 --effects thermal_fade wear_drift
+  rig trials --rounds 2 --jobs 2
+  rig trials --rounds 5 --effects thermal_fade wear_drift
   rig trials --effects thermal_fade+m2_ripple
-  rig trials --seeds 3 --singles --noise 3
+  rig trials --rounds 3 --singles --noise 3
+  rig trials --rounds 4 --laws reserved --seeds-from-commit    a table to publish: cases known by nobody before
+  rig trials --rounds 4 --case 3/20 --json-lines shard3.jsonl  one of 20 shards, for a cluster's job array
+  rig trials --collect shard1.jsonl shard2.jsonl …             their table
+  rig trials --fit-coverage 200                                how many 95 % intervals of rig fit hold the truth
+
+The table gives shares with exact 95 % intervals, for rigs that stick and slip and for those that do not, how well
+the probabilities are calibrated, and what was answered to what. host-sim/docs/trials-on-a-cluster.md tells how to
+spread the cases over machines.
 
 Needs cargo and the project's sources: the generators are a program of their own. rig trials --list shows all
 of its options.")]
 pub(super) struct Trials {
-    /// --seeds N, --singles, --effects ID…, --pairs, --outside, --none, --rate-hz HZ, --noise FACTOR, --form, --keep DIR
+    /// --rounds N, --seeds-from-commit, --laws, --singles, --effects ID…, --pairs, --outside, --none, --jobs N, --case I/N, --json-lines FILE, --collect FILE…, --fit-coverage N, --plan, --rate-hz HZ, --noise FACTOR, --form, --keep DIR
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
     options: Vec<String>,
 }

@@ -4,6 +4,7 @@
 //! closed loop and driven by the true motion. What the page says is computed from the runs; nothing in it is
 //! written down beforehand but the explanations.
 
+mod axes;
 mod charts;
 mod comparison;
 pub mod figure;
@@ -39,13 +40,13 @@ pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputE
     let runs = Runs::new(&mut progress)?;
     let story = Story::new(&runs)?;
     progress(runs::STEPS, runs::STEPS, "report");
-    let page = page(&runs, &story);
+    let page = page(&runs, &story, axes::table(&runs)?);
     let mut table = terminal_table(&runs);
     table.push_str(&format!("{:<8} {:<53} {}\n", "hidden", "what LuGre lacks in figs. 18–21", story.found()));
     Ok(Demo { runs, story, page, table })
 }
 
-fn page(runs: &Runs, story: &Story) -> Page {
+fn page(runs: &Runs, story: &Story, axes: Table) -> Page {
     let mut blocks = vec![
         Block::Heading("The experiments".into()),
         Block::Text(findings::experiments_sentence(runs)),
@@ -65,6 +66,8 @@ fn page(runs: &Runs, story: &Story) -> Page {
     blocks.extend(story.blocks.iter().cloned());
     blocks.push(Block::Heading("What the paper says, and what was found".into()));
     blocks.push(Block::Table(findings::statements(runs)));
+    blocks.push(Block::Heading("On the paper's own axes, and with other assumed numbers".into()));
+    blocks.push(Block::Table(axes));
     blocks.push(Block::Heading("What is assumed".into()));
     blocks.extend(findings::assumptions());
     Page {

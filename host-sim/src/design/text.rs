@@ -1,7 +1,7 @@
 //! A course as an experiment file, and how far the rig lets it go.
 
 use super::family::{Ask, Course};
-use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 
 /// Share of M1's rated torque that is asked for at most: the load overshoots.
@@ -19,11 +19,8 @@ pub fn largest_load_n(rig: &RigFile, models: &[ModelFile]) -> f64 {
 }
 
 fn largest_coefficient(model: &ModelFile) -> f64 {
-    let get = |name| model.get(name).unwrap_or(0.0);
-    match model.kind {
-        ModelKind::Brush => get("mu_s"),
-        _ => get("theta") * (get("a0") + get("a1").max(0.0)),
-    }
+    // A model file that was read makes a model.
+    model.friction_model(1e-4).map_or(1.0, |friction| friction.largest_coefficient())
 }
 
 /// The experiment file's text.

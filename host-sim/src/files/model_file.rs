@@ -9,11 +9,12 @@ use std::path::Path;
 
 use model_core::error::ParameterError;
 use model_core::extension::{Extension as CoreExtension, Extensions};
-use model_core::friction::FrictionModel;
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
 use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::StribeckParameters;
+use model_core::friction::{FrictionModel, FrictionParameters};
+pub use model_core::friction::{ModelKind, ParameterSpec};
 
 use super::effect_id;
 use super::number;
@@ -21,83 +22,14 @@ use super::overrides;
 use super::toml_tree::{Document, FINITE, NOT_NEGATIVE, TableReader};
 use crate::input_error::InputError;
 
-/// Which friction model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ModelKind {
-    /// Brush element with reset.
-    Brush,
-    /// LuGre.
-    Lugre,
-    /// LuGre with the bristle's speed in g, as printed.
-    ModifiedLugre,
-    /// Rubber block in series with LuGre bristles.
-    Series,
-}
-
 /// All kinds with their names in the file.
-pub const MODEL_KINDS: [(&str, ModelKind); 4] = [
-    ("brush", ModelKind::Brush),
-    ("lugre", ModelKind::Lugre),
-    ("modified_lugre", ModelKind::ModifiedLugre),
-    ("series", ModelKind::Series),
-];
-
-/// A parameter of a model: its name in the file, and its value where it may be left out.
-/// What is allowed is the model's own business and is checked by it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ParameterSpec {
-    /// Name with unit.
-    pub name: &'static str,
-    /// Value where the file leaves it out; `None` must be there.
-    pub default: Option<f64>,
+#[must_use]
+pub fn model_kinds() -> Vec<(&'static str, ModelKind)> {
+    ModelKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect()
 }
-
-const fn required(name: &'static str) -> ParameterSpec {
-    ParameterSpec { name, default: None }
-}
-
-const fn optional(name: &'static str, default: f64) -> ParameterSpec {
-    ParameterSpec { name, default: Some(default) }
-}
-
-const SIGMA0: ParameterSpec = required("sigma0_n_per_m");
-const SIGMA1: ParameterSpec = optional("sigma1_n_s_per_m", 0.0);
-const A0: ParameterSpec = required("a0");
-const A1: ParameterSpec = required("a1");
-const A2: ParameterSpec = optional("a2_s_per_m", 0.0);
-const V0: ParameterSpec = required("v0_m_s");
-const DELTA: ParameterSpec = optional("delta", 0.5);
-const THETA: ParameterSpec = optional("theta", 1.0);
-const K_U: ParameterSpec = required("k_u_n_per_m");
-const C_U: ParameterSpec = required("c_u_n_s_per_m");
-
-const BRUSH: [ParameterSpec; 3] = [required("c_n_per_m"), required("mu_s"), required("mu_c")];
-const LUGRE: [ParameterSpec; 8] = [SIGMA0, SIGMA1, A0, A1, A2, V0, DELTA, THETA];
-const SERIES: [ParameterSpec; 10] = [SIGMA0, SIGMA1, A0, A1, A2, V0, DELTA, THETA, K_U, C_U];
 
 /// Any step size, to have the numbers checked.
 const SOME_STEP_S: f64 = 1e-4;
-
-impl ModelKind {
-    /// Name in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Brush => "brush",
-            Self::Lugre => "lugre",
-            Self::ModifiedLugre => "modified_lugre",
-            Self::Series => "series",
-        }
-    }
-
-    /// Its parameters in the order of the file.
-    pub fn parameters(self) -> &'static [ParameterSpec] {
-        match self {
-            Self::Brush => &BRUSH,
-            Self::Lugre | Self::ModifiedLugre => &LUGRE,
-            Self::Series => &SERIES,
-        }
-    }
-}
 
 /// What `fit` found about a parameter's uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -187,9 +119,9 @@ impl ModelFile {
     }
 
     fn from_root(root: &TableReader<'_>, source: &str) -> Result<Self, InputError> {
-        let names: Vec<&str> = MODEL_KINDS.iter().map(|(name, _)| *name).collect();
-        let kind =
-            root.choice("kind", &MODEL_KINDS)?.ok_or_else(|| root.missing("kind", &names.join(", ")))?;
+        let kinds = model_kinds();
+        let names: Vec<&str> = kinds.iter().map(|(name, _)| *name).collect();
+        let kind = root.choice("kind", &kinds)?.ok_or_else(|| root.missing("kind", &names.join(", ")))?;
         let table =
             root.table("parameters")?.ok_or_else(|| root.missing("parameters", "a table [parameters]"))?;
         let given = kind.parameters().iter().map(|spec| table.number(spec.name, FINITE));
@@ -237,12 +169,15 @@ impl ModelFile {
     }
 
     fn build(&self, step_s: f64) -> Result<FrictionModel<f64>, ParameterError> {
-        match self.kind {
-            ModelKind::Brush => FrictionModel::brush(&self.brush(), step_s),
-            ModelKind::Lugre => FrictionModel::lugre(&self.bristles(), step_s),
-            ModelKind::ModifiedLugre => FrictionModel::modified_lugre(&self.bristles(), step_s),
-            ModelKind::Series => FrictionModel::series(&self.block_and_bristles(), step_s),
-        }
+        self.kind.build(&self.values, step_s)
+    }
+
+    /// Kind and numbers, without uncertainties and effects.
+    #[must_use]
+    pub fn friction(&self) -> FrictionParameters<f64> {
+        // The file was checked when it was read: it has a value for each parameter of its kind.
+        let assumed = FrictionParameters::typical(self.kind);
+        FrictionParameters::new(self.kind, &self.values).unwrap_or(assumed)
     }
 
     /// A parameter that the kind has; a name that it does not have is not a number, which every model refuses.
@@ -401,8 +336,11 @@ mod tests {
                 .contains("parameters.a00 = 0.5: unknown key; allowed: sigma0_n_per_m, ")
         );
         assert_eq!(
-            refused(&LUGRE.replace("lugre", "dahl")),
-            "m.toml:1: kind = \"dahl\": not known; allowed: brush, lugre, modified_lugre, series"
+            refused(&LUGRE.replace("lugre", "glue")),
+            format!(
+                "m.toml:1: kind = \"glue\": not known; allowed: {}",
+                ModelKind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
+            )
         );
         assert!(
             refused(&format!("{LUGRE}k_u_n_per_m = 3e4\n")).starts_with(

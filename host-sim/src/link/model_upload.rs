@@ -1,10 +1,10 @@
 //! A model file as the record that the firmware stores and its observer runs.
 
-use rig_link::model::{BristleRecord, EffectRecord, FrictionRecord, MOST_EFFECTS, ModelRecord};
+use rig_link::model::{EffectRecord, MOST_EFFECTS, ModelRecord};
 
 use model_core::extension::Extension;
 
-use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::model_file::ModelFile;
 use crate::input_error::InputError;
 
 /// The record of a model file.
@@ -35,7 +35,7 @@ pub fn record(model: &ModelFile) -> Result<ModelRecord, InputError> {
                 .allowed(format!("up to {MOST_EFFECTS}"))
         })?;
     }
-    Ok(ModelRecord { friction: friction(model), effects })
+    Ok(ModelRecord { friction: (&model.friction().cast()).into(), effects })
 }
 
 #[allow(clippy::cast_possible_truncation)]
@@ -45,33 +45,6 @@ fn single(value: f64) -> f32 {
 
 fn ids() -> String {
     Extension::ALL.iter().map(|effect| effect.id()).collect::<Vec<_>>().join(", ")
-}
-
-fn friction(model: &ModelFile) -> FrictionRecord {
-    // A file that was read has a value for each parameter of its kind.
-    let value = |name: &str| single(model.get(name).unwrap_or_default());
-    let bristles = || BristleRecord {
-        sigma0_n_per_m: value("sigma0_n_per_m"),
-        sigma1_n_s_per_m: value("sigma1_n_s_per_m"),
-        a0: value("a0"),
-        a1: value("a1"),
-        a2_s_per_m: value("a2_s_per_m"),
-        v0_m_s: value("v0_m_s"),
-        delta: value("delta"),
-        theta: value("theta"),
-    };
-    match model.kind {
-        ModelKind::Brush => {
-            FrictionRecord::Brush { c_n_per_m: value("c_n_per_m"), mu_s: value("mu_s"), mu_c: value("mu_c") }
-        }
-        ModelKind::Lugre => FrictionRecord::Lugre(bristles()),
-        ModelKind::ModifiedLugre => FrictionRecord::ModifiedLugre(bristles()),
-        ModelKind::Series => FrictionRecord::Series {
-            k_u_n_per_m: value("k_u_n_per_m"),
-            c_u_n_s_per_m: value("c_u_n_s_per_m"),
-            bristles: bristles(),
-        },
-    }
 }
 
 #[cfg(test)]

@@ -6,14 +6,9 @@
 
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::{Motor, RigFile};
-use crate::plant::ElementParameters;
 use model_core::control::ControlSettings;
 use model_core::control::observer::ModelParameters;
 use model_core::control::settings::DriveSettings;
-use model_core::friction::brush::BrushParameters;
-use model_core::friction::lugre::LugreParameters;
-use model_core::friction::series::SeriesParameters;
-use model_core::friction::stribeck::StribeckParameters;
 
 /// Settings for a rig, with the observer on a model.
 #[must_use]
@@ -35,40 +30,6 @@ pub fn control_settings(rig: &RigFile, observer: &ModelFile) -> ControlSettings 
     settings.m1_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
     settings.m2_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
     settings.observer.bridge_lowpass_hz = rig.friction_bridge.lowpass_hz.unwrap_or(0.0) as f32;
-    if let Some(model) = single_precision(&ElementParameters::from_file(observer)) {
-        settings.observer.model = model;
-    }
+    settings.observer.model = ModelParameters::Elements(observer.friction().cast());
     settings
-}
-
-#[allow(clippy::cast_possible_truncation)]
-/// The observer's parameters; it knows no patch, which no model file can name either.
-fn single_precision(p: &ElementParameters) -> Option<ModelParameters> {
-    let lugre = |p: &LugreParameters<f64>| LugreParameters {
-        sigma0_n_per_m: p.sigma0_n_per_m as f32,
-        sigma1_n_s_per_m: p.sigma1_n_s_per_m as f32,
-        a2_s_per_m: p.a2_s_per_m as f32,
-        stribeck: StribeckParameters {
-            a0: p.stribeck.a0 as f32,
-            a1: p.stribeck.a1 as f32,
-            v0_m_s: p.stribeck.v0_m_s as f32,
-            delta: p.stribeck.delta as f32,
-            theta: p.stribeck.theta as f32,
-        },
-    };
-    Some(match p {
-        ElementParameters::Brush(p) => ModelParameters::Brush(BrushParameters {
-            c_n_per_m: p.c_n_per_m as f32,
-            mu_s: p.mu_s as f32,
-            mu_c: p.mu_c as f32,
-        }),
-        ElementParameters::Lugre(p) => ModelParameters::Lugre(lugre(p)),
-        ElementParameters::ModifiedLugre(p) => ModelParameters::ModifiedLugre(lugre(p)),
-        ElementParameters::Series(p) => ModelParameters::Series(SeriesParameters {
-            k_u_n_per_m: p.k_u_n_per_m as f32,
-            c_u_n_s_per_m: p.c_u_n_s_per_m as f32,
-            bristles: lugre(&p.bristles),
-        }),
-        ElementParameters::LugrePatch(_) => return None,
-    })
 }

@@ -6,24 +6,17 @@
 use super::effects::Affected;
 use model_core::error::ParameterError;
 use model_core::extension::{ExtendedState, Extensions};
-use model_core::friction::brush::BrushParameters;
-use model_core::friction::lugre::LugreParameters;
 use model_core::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
 use model_core::friction::series::SeriesParameters;
-use model_core::friction::stribeck::StribeckParameters;
-use model_core::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
+use model_core::friction::{
+    Contact, FrictionForce, FrictionModel, FrictionParameters, FrictionState, ModelKind,
+};
 
 /// Friction parameters of all elements together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ElementParameters {
-    /// Brush with reset.
-    Brush(BrushParameters<f64>),
-    /// LuGre.
-    Lugre(LugreParameters<f64>),
-    /// Modified LuGre as printed.
-    ModifiedLugre(LugreParameters<f64>),
-    /// Rubber block in series with LuGre bristles.
-    Series(SeriesParameters<f64>),
+    /// One of the core's models.
+    Elements(FrictionParameters<f64>),
     /// LuGre tyre patch, eq. 15, on elements that slide but do not roll: without transport all points of the patch
     /// do the same, and what is left of the difference to LuGre is that stiffness grows with the load.
     LugrePatch(PatchParameters<f64>),
@@ -32,16 +25,7 @@ pub enum ElementParameters {
 impl Default for ElementParameters {
     /// The series element with the assumed numbers.
     fn default() -> Self {
-        Self::Series(SeriesParameters {
-            k_u_n_per_m: 3e4,
-            c_u_n_s_per_m: 160.0,
-            bristles: LugreParameters {
-                sigma0_n_per_m: 1.76e7,
-                sigma1_n_s_per_m: 0.0,
-                a2_s_per_m: 0.0,
-                stribeck: StribeckParameters { a0: 0.5, a1: 0.7, v0_m_s: 0.5, delta: 0.5, theta: 1.0 },
-            },
-        })
+        Self::Elements(FrictionParameters::typical(ModelKind::Series))
     }
 }
 
@@ -50,31 +34,25 @@ impl ElementParameters {
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
-            Self::Brush(_) => "brush",
-            Self::Lugre(_) => "lugre",
-            Self::ModifiedLugre(_) => "modified_lugre",
-            Self::Series(_) => "series",
+            Self::Elements(p) => p.kind().name(),
             Self::LugrePatch(_) => "lugre_patch",
+        }
+    }
+
+    /// The rubber's numbers, where the model has a block in series with bristles.
+    #[must_use]
+    pub fn series(&self) -> Option<SeriesParameters<f64>> {
+        match self {
+            Self::Elements(p) => p.as_series(),
+            Self::LugrePatch(_) => None,
         }
     }
 
     /// Parameters of an element with this share of stiffness and damping.
     #[must_use]
     pub fn share(&self, share: f64) -> Self {
-        let lugre = |p: &LugreParameters<f64>| LugreParameters {
-            sigma0_n_per_m: p.sigma0_n_per_m * share,
-            sigma1_n_s_per_m: p.sigma1_n_s_per_m * share,
-            ..*p
-        };
         match self {
-            Self::Brush(p) => Self::Brush(BrushParameters { c_n_per_m: p.c_n_per_m * share, ..*p }),
-            Self::Lugre(p) => Self::Lugre(lugre(p)),
-            Self::ModifiedLugre(p) => Self::ModifiedLugre(lugre(p)),
-            Self::Series(p) => Self::Series(SeriesParameters {
-                k_u_n_per_m: p.k_u_n_per_m * share,
-                c_u_n_s_per_m: p.c_u_n_s_per_m * share,
-                bristles: lugre(&p.bristles),
-            }),
+            Self::Elements(p) => Self::Elements(p.share(share)),
             // Stiffness per unit load is the same for each part of the load.
             Self::LugrePatch(p) => Self::LugrePatch(*p),
         }
@@ -86,10 +64,7 @@ impl ElementParameters {
     /// The parameter out of range.
     pub fn model(&self, step_s: f64) -> Result<ElementModel, ParameterError> {
         Ok(match self {
-            Self::Brush(p) => ElementModel::Single(FrictionModel::brush(p, step_s)?),
-            Self::Lugre(p) => ElementModel::Single(FrictionModel::lugre(p, step_s)?),
-            Self::ModifiedLugre(p) => ElementModel::Single(FrictionModel::modified_lugre(p, step_s)?),
-            Self::Series(p) => ElementModel::Single(FrictionModel::series(p, step_s)?),
+            Self::Elements(p) => ElementModel::Single(p.model(step_s)?),
             Self::LugrePatch(p) => ElementModel::Patch(LugrePatch::new(p, step_s)?),
         })
     }
@@ -97,13 +72,16 @@ impl ElementParameters {
     /// Stiffness that the disc feels while the elements stick.
     pub(crate) fn sticking_stiffness_n_per_m(&self) -> f64 {
         match self {
-            Self::Brush(p) => p.c_n_per_m,
-            Self::Lugre(p) | Self::ModifiedLugre(p) => p.sigma0_n_per_m,
-            Self::Series(p) => p.k_u_n_per_m,
+            Self::Elements(p) => {
+                p.model(SOME_STEP_S).map_or(0.0, |m| m.sticking_stiffness_n_per_m(LARGE_LOAD_N))
+            }
             Self::LugrePatch(p) => p.sigma0_per_m * LARGE_LOAD_N,
         }
     }
 }
+
+/// Any step, to ask a model what does not depend on it.
+const SOME_STEP_S: f64 = 1e-4;
 
 /// What the rig presses with at most, about.
 const LARGE_LOAD_N: f64 = 200.0;
@@ -158,10 +136,7 @@ impl ElementState {
     #[must_use]
     pub fn deformation_m(&self) -> f64 {
         match self {
-            Self::Single(FrictionState::Brush(e)) => e.deformation_m,
-            Self::Single(FrictionState::Lugre(e)) => e.deflection_m,
-            Self::Single(FrictionState::ModifiedLugre(e)) => e.deflection_m,
-            Self::Single(FrictionState::Series(e)) => e.deformation_m,
+            Self::Single(e) => e.deformation_m(),
             Self::Patch(e) => e.deflection_m[0],
         }
     }
@@ -268,7 +243,7 @@ mod tests {
         let step = 1e-4;
         for p in [
             ElementParameters::default(),
-            ElementParameters::Brush(BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 }),
+            ElementParameters::Elements(FrictionParameters::typical(ModelKind::Brush)),
         ] {
             let equal = Elements::new(&p, [1.0 / 3.0; 3], step).unwrap();
             let each = Elements { equal: false, ..equal };

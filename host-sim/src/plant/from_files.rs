@@ -7,7 +7,7 @@ use super::parameters::{
     NoiseParameters, PlantParameters, PressureParameters, ShaftParameters, Substeps,
 };
 use crate::files::experiment_file::PlantOptions;
-use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::model_file::ModelFile;
 use crate::files::rig_file::{Bridge, Motor, RigFile};
 
 impl PlantParameters {
@@ -62,11 +62,6 @@ impl ElementParameters {
     /// The parameters of a model file, without its extensions.
     #[must_use]
     pub fn from_file(model: &ModelFile) -> Self {
-        match model.kind {
-            ModelKind::Brush => Self::Brush(model.brush()),
-            ModelKind::Lugre => Self::Lugre(model.bristles()),
-            ModelKind::ModifiedLugre => Self::ModifiedLugre(model.bristles()),
-            ModelKind::Series => Self::Series(model.block_and_bristles()),
-        }
+        Self::Elements(model.friction())
     }
 }

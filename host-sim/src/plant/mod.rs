@@ -160,12 +160,15 @@ impl Plant {
     /// Advances the plant by one control period with torque commands in N·m, without sampling it.
     pub fn advance(&mut self, m1_command_nm: f64, m2_command_nm: f64) {
         let commands = [m1_command_nm, m2_command_nm];
-        let grid = if self.activity.is_busy(&self.state, commands) { self.busy } else { self.calm };
+        // By reference: a grid holds two prepared models, and copying it each period costs more than a calm step.
+        let busy = self.activity.is_busy(&self.state, commands);
+        let substeps = if busy { self.busy.substeps } else { self.calm.substeps };
         if let Some(sweeps) = &mut self.sweeps {
             sweeps.clear();
         }
-        for k in 0..grid.substeps {
+        for k in 0..substeps {
             let from = self.sweeps.is_some().then(|| self.positions());
+            let grid = if busy { &self.busy } else { &self.calm };
             grid.advance(&self.disc, self.radius_m, &mut self.state, commands);
             if let Some(from) = from {
                 let to = self.positions();

@@ -127,19 +127,9 @@ fn counts(
     inputs: &ContactInputs,
     accuracy: Accuracy,
 ) -> Vec<u16> {
-    let stribeck: Option<&Stribeck<f64>> = match model {
-        FrictionModel::Brush(_) => None,
-        FrictionModel::Lugre(lugre) => Some(lugre.stribeck()),
-        FrictionModel::ModifiedLugre(modified) => Some(modified.stribeck()),
-        FrictionModel::Series(series) => Some(series.bristles().stribeck()),
-    };
+    let stribeck = model.stribeck();
     let bridge_s = if bridge.is_ideal() { f64::INFINITY } else { LONGEST_BRIDGE_STEP_S };
-    let block_s = match model {
-        FrictionModel::Series(series) => {
-            series.damping_n_s_per_m() / series.stiffness_n_per_m() / accuracy.steps_per_block_time()
-        }
-        _ => f64::INFINITY,
-    };
+    let block_s = model.block_time_s().map_or(f64::INFINITY, |t| t / accuracy.steps_per_block_time());
     let longest_s = bridge_s.min(block_s);
     let coefficients: Vec<f64> = match stribeck {
         Some(stribeck) => inputs.sliding_speed_m_s.iter().map(|v| stribeck.coefficient(*v)).collect(),
@@ -155,10 +145,7 @@ fn counts(
         let change = if v0 * v1 < 0.0 { 2.0 * largest - g0 - g1 } else { (g0 - g1).abs() };
         let (n0, n1) = (inputs.normal_force_n[i - 1], inputs.normal_force_n[i]);
         let load = if n0 > 0.0 && n1 > 0.0 { (n1 - n0).abs() / n0.min(n1) } else { 0.0 };
-        let bristles = match model {
-            FrictionModel::ModifiedLugre(m) => turned.steps(v0, v1, step_s, m.largest_deflection_m(n1)),
-            _ => 0.0,
-        };
+        let bristles = model.winding_reach_m(n1).map_or(0.0, |reach_m| turned.steps(v0, v1, step_s, reach_m));
         let finer = (change / (g0.min(g1) * CHANGE_OF_G)).max(load / CHANGE_OF_LOAD).max(bristles);
         (step_s / longest_s).max(finer * accuracy.factor()).ceil().clamp(1.0, MOST_STEPS) as u16
     });

@@ -8,12 +8,12 @@
 use crate::plant::{ElementModel, ElementParameters};
 use crate::report::Role;
 use model_core::error::ParameterError;
-use model_core::friction::Contact;
 use model_core::friction::brush::BrushParameters;
 use model_core::friction::lugre::LugreParameters;
 use model_core::friction::lugre_patch::PatchParameters;
 use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::Stribeck;
+use model_core::friction::{Contact, FrictionParameters};
 
 /// One of the five.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,10 +31,7 @@ pub struct Contender {
 /// The rubber behind a set of parameters: only the series element names block and bristles both.
 #[must_use]
 pub fn rubber_of(parameters: &ElementParameters) -> Option<SeriesParameters<f64>> {
-    match parameters {
-        ElementParameters::Series(p) => Some(*p),
-        _ => None,
-    }
+    parameters.series()
 }
 
 /// The five models of one rubber, for comparisons at a sliding speed and a normal force.
@@ -48,24 +45,25 @@ pub fn five(
 ) -> Result<[Contender; 5], ParameterError> {
     let curve = Stribeck::new(&rubber.bristles.stribeck)?;
     let bristles = LugreParameters { sigma0_n_per_m: rubber.k_u_n_per_m, ..rubber.bristles };
+    let element = ElementParameters::Elements;
     Ok([
         Contender {
             name: "brush, eqs. 4–6",
             role: Role::Brush,
             why: "It drops from µ_s to µ_c at once when it breaks loose. The size of the drop is put in by hand, and \
                   so is µ_c, for each speed anew.",
-            parameters: ElementParameters::Brush(BrushParameters {
+            parameters: element(FrictionParameters::brush(&BrushParameters {
                 c_n_per_m: rubber.k_u_n_per_m,
                 mu_s: curve.largest(),
                 mu_c: curve.coefficient(sliding_speed_m_s),
-            }),
+            })),
         },
         Contender {
             name: "LuGre, eqs. 12–14",
             role: Role::Lugre,
             why: "It cannot: at constant speed g(v) is one number, and the deflection rises monotonically to \
-                  F_N g(v)/σ0.",
-            parameters: ElementParameters::Lugre(bristles),
+                  F_N g(v)/σ0. Its force could with σ1 v > F_N g(v); here σ1 = 0.",
+            parameters: element(FrictionParameters::lugre(&bristles)),
         },
         Contender {
             name: "LuGre patch, eqs. 15–16",
@@ -84,15 +82,15 @@ pub fn five(
             name: "modified LuGre, eqs. 17–19",
             role: Role::ModifiedLugre,
             why: "It cannot: the equation for the asperities' speed s has exactly one root, so u̇ depends on u alone, \
-                  and u rises monotonically. The printed overshoot comes from taking u̇ of the step before.",
-            parameters: ElementParameters::ModifiedLugre(bristles),
+                  and u rises monotonically (a0 > a1 δ e^{−(1 + 1/δ)}, σ1 = 0). A rate that lags gives an overshoot.",
+            parameters: element(FrictionParameters::modified_lugre(&bristles)),
         },
         Contender {
             name: "series element, Fig. 25",
             role: Role::Series,
             why: "It does: while the block winds up, the asperities slide slower than the root, so they feel a larger \
                   g than that of steady sliding; when they have caught up, friction falls to F_N g(v).",
-            parameters: ElementParameters::Series(*rubber),
+            parameters: element(FrictionParameters::series(rubber)),
         },
     ])
 }
@@ -127,8 +125,7 @@ mod tests {
     use super::*;
 
     fn rubber() -> SeriesParameters<f64> {
-        let ElementParameters::Series(p) = ElementParameters::default() else { panic!("the assumed rubber") };
-        p
+        ElementParameters::default().series().unwrap()
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! Studies that need no motors, and the models that are compared.
 
+pub mod bristle_damping;
 pub mod contenders;
 pub mod patch_crossing;
+pub mod readings;
+pub mod rivals;
 pub mod speed_sweep;

@@ -87,8 +87,10 @@ pub fn run(slip: &PatchCrossing, rubber: &SeriesParameters<f64>) -> Result<Cross
         largest_transport_speed_m_s: roll,
     };
     for model in &models {
-        match &model.parameters {
-            ElementParameters::Brush(p) => {
+        let ElementParameters::Elements(parameters) = &model.parameters else { continue };
+        match model.role {
+            Role::Brush => {
+                let Some(p) = &parameters.as_brush() else { continue };
                 let patch = BrushPatch::<f64, POINTS>::new(p, slip.patch_length_m, roll, step_s)?;
                 let mut state = BrushPatchState::default();
                 (0..steps).for_each(|_| {
@@ -97,7 +99,7 @@ pub fn run(slip: &PatchCrossing, rubber: &SeriesParameters<f64>) -> Result<Cross
                 let u = state.element.iter().map(|e| e.deformation_m).collect();
                 add("brush_m", Role::Brush, u, None);
             }
-            ElementParameters::Lugre(_) => {
+            Role::Lugre => {
                 let patch = LugrePatch::<f64, POINTS>::new(&patch_parameters, step_s)?;
                 let mut state = PatchState::default();
                 (0..steps).for_each(|_| {
@@ -105,7 +107,8 @@ pub fn run(slip: &PatchCrossing, rubber: &SeriesParameters<f64>) -> Result<Cross
                 });
                 add("lugre_m", Role::LugrePatch, state.deflection_m.to_vec(), None);
             }
-            ElementParameters::ModifiedLugre(p) => {
+            Role::ModifiedLugre => {
+                let Some(p) = &parameters.bristles() else { continue };
                 let patch = ModifiedLugrePatch::<f64, POINTS>::new(p, slip.patch_length_m, roll, step_s)?;
                 let mut state = ModifiedPatchState::default();
                 (0..steps).for_each(|_| {
@@ -114,7 +117,8 @@ pub fn run(slip: &PatchCrossing, rubber: &SeriesParameters<f64>) -> Result<Cross
                 let u = state.element.iter().map(|e| e.deflection_m).collect();
                 add("modified_lugre_m", Role::ModifiedLugre, u, None);
             }
-            ElementParameters::Series(p) => {
+            Role::Series => {
+                let Some(p) = &parameters.as_series() else { continue };
                 let fine = 20;
                 let element = Series::new(p, spacing / roll / f64::from(fine))?;
                 let mut state = SeriesState::default();
@@ -126,7 +130,7 @@ pub fn run(slip: &PatchCrossing, rubber: &SeriesParameters<f64>) -> Result<Cross
                     .unzip();
                 add("series_m", Role::Series, u, Some(force));
             }
-            ElementParameters::LugrePatch(_) => {}
+            _ => {}
         }
     }
     let path_m = (0..POINTS).map(|k| (k + 1) as f64 * spacing).collect();
@@ -182,9 +186,7 @@ mod tests {
 
     #[test]
     fn brush_and_series_pass_a_maximum_and_the_lugre_patches_rise_monotonically() {
-        let ElementParameters::Series(rubber) = ElementParameters::default() else {
-            panic!("the assumed rubber")
-        };
+        let rubber = ElementParameters::default().series().unwrap();
         let slip = PatchCrossing {
             sliding_speed_m_s: 0.06,
             rolling_speed_m_s: 0.8,

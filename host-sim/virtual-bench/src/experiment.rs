@@ -116,8 +116,7 @@ impl Request {
 
 /// A patch with the bristles of a series element: 10 mm long, under 88 N as stiff.
 fn patch(friction: &FrictionRecord) -> FrictionRecord {
-    let FrictionRecord::Series { bristles, .. } = *friction else { return *friction };
-    FrictionRecord::LugrePatch { sigma0_per_m: bristles.sigma0_n_per_m / 88.0, length_m: 0.01, bristles }
+    friction.patch_like(0.01, 88.0).unwrap_or_else(|| friction.clone())
 }
 
 /// What the observer's model left unexplained of the friction torque, over the rows of the log.

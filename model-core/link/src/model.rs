@@ -1,17 +1,15 @@
 //! The observer's friction model on the wire and in flash: the model file's numbers, nothing else.
 //!
-//! Effects travel under their ids and not by number, because a record in flash outlives the firmware
-//! that wrote it.
+//! Kinds and effects travel under their names and not by number, because a record in flash outlives the
+//! firmware that wrote it.
 
 use heapless::{String, Vec};
 use model_core::control::{ControlSettings, ModelParameters, ObserverModel};
 use model_core::error::ParameterError;
 use model_core::extension::{Extension, Extensions, MOST_VALUES};
-use model_core::friction::brush::BrushParameters;
-use model_core::friction::lugre::LugreParameters;
 use model_core::friction::lugre_patch::PatchParameters;
-use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::StribeckParameters;
+use model_core::friction::{FrictionParameters, MOST_PARAMETERS, ModelKind};
 use serde::{Deserialize, Serialize};
 
 /// The most effects of an uploaded model.
@@ -35,144 +33,90 @@ pub struct EffectRecord {
     pub values: Vec<f32, MOST_VALUES>,
 }
 
-/// A friction model by kind, with the parameters of the model file under their names there.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum FrictionRecord {
-    /// Brush with reset.
-    Brush {
-        /// Stiffness.
-        c_n_per_m: f32,
-        /// Static coefficient.
-        mu_s: f32,
-        /// Sliding coefficient.
-        mu_c: f32,
-    },
-    /// LuGre.
-    Lugre(BristleRecord),
-    /// Modified LuGre as printed.
-    ModifiedLugre(BristleRecord),
-    /// Rubber block in series with bristles.
-    Series {
-        /// Block stiffness.
-        k_u_n_per_m: f32,
-        /// Block damping.
-        c_u_n_s_per_m: f32,
-        /// The bristles.
-        bristles: BristleRecord,
-    },
-    /// LuGre contact patch, for its cost on the chip: model files have no such kind.
-    LugrePatch {
-        /// Stiffness of the bristles per load.
-        sigma0_per_m: f32,
-        /// Length of the patch.
-        length_m: f32,
-        /// The curve of sliding; its stiffness and damping are not used.
-        bristles: BristleRecord,
-    },
+/// A friction model by kind, with the values of the model file in its order.
+///
+/// The kind is `"lugre_patch"` for the patch that the observer can run though no model file names it; its values are
+/// `sigma0_per_m, length_m, a0, a1, a2_s_per_m, v0_m_s, delta, theta`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrictionRecord {
+    /// Name in the model file.
+    pub kind: String<20>,
+    /// One value for each of its parameters.
+    pub values: Vec<f32, MOST_PARAMETERS>,
 }
+
+/// The patch that model files do not have.
+const PATCH: &str = "lugre_patch";
 
 /// Fastest transport a patch is prepared for: the rig's over-speed limit at its radius.
 const PATCH_SPEED_M_S: f32 = 3.0;
 
-/// Parameters of the bristles.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BristleRecord {
-    /// Bristle stiffness.
-    pub sigma0_n_per_m: f32,
-    /// Bristle damping.
-    pub sigma1_n_s_per_m: f32,
-    /// Coulomb coefficient.
-    pub a0: f32,
-    /// Static less Coulomb coefficient.
-    pub a1: f32,
-    /// Viscous coefficient.
-    pub a2_s_per_m: f32,
-    /// Stribeck speed.
-    pub v0_m_s: f32,
-    /// Exponent.
-    pub delta: f32,
-    /// Road factor.
-    pub theta: f32,
-}
-
-impl From<&LugreParameters<f32>> for BristleRecord {
-    fn from(p: &LugreParameters<f32>) -> Self {
+impl FrictionRecord {
+    fn new(kind: &str, values: &[f32]) -> Self {
+        // Both have room for the longest; a test holds them to it.
         Self {
-            sigma0_n_per_m: p.sigma0_n_per_m,
-            sigma1_n_s_per_m: p.sigma1_n_s_per_m,
-            a0: p.stribeck.a0,
-            a1: p.stribeck.a1,
-            a2_s_per_m: p.a2_s_per_m,
-            v0_m_s: p.stribeck.v0_m_s,
-            delta: p.stribeck.delta,
-            theta: p.stribeck.theta,
+            kind: String::try_from(kind).unwrap_or_default(),
+            values: Vec::from_slice(values).unwrap_or_default(),
         }
+    }
+
+    /// A patch with the bristles of an element, as stiff under `load_n`; `None` where the element has none.
+    #[must_use]
+    pub fn patch_like(&self, length_m: f32, load_n: f32) -> Option<Self> {
+        let ModelParameters::Elements(element) = self.parameters().ok()? else { return None };
+        let p = element.bristles()?;
+        Some(Self::from(&ModelParameters::LugrePatch(PatchParameters {
+            sigma0_per_m: p.sigma0_n_per_m / load_n,
+            a2_s_per_m: p.a2_s_per_m,
+            stribeck: p.stribeck,
+            length_m,
+            largest_transport_speed_m_s: PATCH_SPEED_M_S,
+        })))
+    }
+
+    /// The parameters of the observer.
+    ///
+    /// # Errors
+    /// A kind that this firmware does not have, or a wrong number of values.
+    pub fn parameters(&self) -> Result<ModelParameters, ParameterError> {
+        if self.kind == PATCH {
+            let [sigma0_per_m, length_m, a0, a1, a2_s_per_m, v0_m_s, delta, theta] = self
+                .values
+                .as_slice()
+                .try_into()
+                .map_err(|_| refusal(self.values.len() as f64, "eight values of a patch"))?;
+            return Ok(ModelParameters::LugrePatch(PatchParameters {
+                sigma0_per_m,
+                a2_s_per_m,
+                stribeck: StribeckParameters { a0, a1, v0_m_s, delta, theta },
+                length_m,
+                largest_transport_speed_m_s: PATCH_SPEED_M_S,
+            }));
+        }
+        let kind = ModelKind::with_name(&self.kind)
+            .ok_or(refusal(f64::NAN, "the name of a friction model that this firmware has"))?;
+        FrictionParameters::new(kind, &self.values).map(ModelParameters::Elements)
     }
 }
 
-impl From<&BristleRecord> for LugreParameters<f32> {
-    fn from(record: &BristleRecord) -> Self {
-        Self {
-            sigma0_n_per_m: record.sigma0_n_per_m,
-            sigma1_n_s_per_m: record.sigma1_n_s_per_m,
-            a2_s_per_m: record.a2_s_per_m,
-            stribeck: StribeckParameters {
-                a0: record.a0,
-                a1: record.a1,
-                v0_m_s: record.v0_m_s,
-                delta: record.delta,
-                theta: record.theta,
-            },
-        }
+const fn refusal(value: f64, allowed: &'static str) -> ParameterError {
+    ParameterError { name: "kind", value, allowed }
+}
+
+impl From<&FrictionParameters<f32>> for FrictionRecord {
+    fn from(p: &FrictionParameters<f32>) -> Self {
+        Self::new(p.kind().name(), p.values())
     }
 }
 
 impl From<&ModelParameters> for FrictionRecord {
     fn from(model: &ModelParameters) -> Self {
         match model {
-            ModelParameters::Brush(p) => Self::Brush { c_n_per_m: p.c_n_per_m, mu_s: p.mu_s, mu_c: p.mu_c },
-            ModelParameters::Lugre(p) => Self::Lugre(p.into()),
-            ModelParameters::ModifiedLugre(p) => Self::ModifiedLugre(p.into()),
-            ModelParameters::Series(p) => Self::Series {
-                k_u_n_per_m: p.k_u_n_per_m,
-                c_u_n_s_per_m: p.c_u_n_s_per_m,
-                bristles: (&p.bristles).into(),
-            },
-            ModelParameters::LugrePatch(p) => Self::LugrePatch {
-                sigma0_per_m: p.sigma0_per_m,
-                length_m: p.length_m,
-                bristles: BristleRecord::from(&LugreParameters {
-                    sigma0_n_per_m: 0.0,
-                    sigma1_n_s_per_m: 0.0,
-                    a2_s_per_m: p.a2_s_per_m,
-                    stribeck: p.stribeck,
-                }),
-            },
-        }
-    }
-}
-
-impl From<&FrictionRecord> for ModelParameters {
-    fn from(record: &FrictionRecord) -> Self {
-        match *record {
-            FrictionRecord::Brush { c_n_per_m, mu_s, mu_c } => {
-                Self::Brush(BrushParameters { c_n_per_m, mu_s, mu_c })
-            }
-            FrictionRecord::Lugre(bristles) => Self::Lugre((&bristles).into()),
-            FrictionRecord::ModifiedLugre(bristles) => Self::ModifiedLugre((&bristles).into()),
-            FrictionRecord::Series { k_u_n_per_m, c_u_n_s_per_m, bristles } => {
-                let bristles = (&bristles).into();
-                Self::Series(SeriesParameters { k_u_n_per_m, c_u_n_s_per_m, bristles })
-            }
-            FrictionRecord::LugrePatch { sigma0_per_m, length_m, bristles } => {
-                let LugreParameters { a2_s_per_m, stribeck, .. } = (&bristles).into();
-                Self::LugrePatch(PatchParameters {
-                    sigma0_per_m,
-                    a2_s_per_m,
-                    stribeck,
-                    length_m,
-                    largest_transport_speed_m_s: PATCH_SPEED_M_S,
-                })
+            ModelParameters::Elements(p) => p.into(),
+            ModelParameters::LugrePatch(p) => {
+                let s = &p.stribeck;
+                let (stiffness, length) = (p.sigma0_per_m, p.length_m);
+                Self::new(PATCH, &[stiffness, length, s.a0, s.a1, p.a2_s_per_m, s.v0_m_s, s.delta, s.theta])
             }
         }
     }
@@ -200,6 +144,6 @@ impl ModelRecord {
             })?;
             effects.set(effect, &record.values)?;
         }
-        ObserverModel::extended(&(&self.friction).into(), effects, settings.geometry.friction_radius_m)
+        ObserverModel::extended(&self.friction.parameters()?, effects, settings.geometry.friction_radius_m)
     }
 }

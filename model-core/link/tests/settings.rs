@@ -1,12 +1,13 @@
 //! The list of settings is sound, and an uploaded experiment is the one that was sent.
 #![allow(clippy::unwrap_used)]
 use heapless::String;
-use model_core::control::{ControlSettings, Experiment, M1Mode, M2Mode, ModelParameters, Segment, Shape};
+use model_core::control::{ControlSettings, Experiment, M1Mode, M2Mode, Segment, Shape};
 use model_core::extension::{Extension, MOST_VALUES};
+use model_core::friction::{FrictionParameters, MOST_PARAMETERS, ModelKind};
 use rig_link::capture::CaptureRow;
 use rig_link::frame::{MAX_FRAME, encode};
 use rig_link::message::{Command, Request};
-use rig_link::model::{BristleRecord, EffectRecord, FrictionRecord, MOST_EFFECTS, ModelRecord};
+use rig_link::model::{EffectRecord, FrictionRecord, MOST_EFFECTS, ModelRecord};
 use rig_link::program::{Incomplete, Upload, header, segments};
 use rig_link::settings::{ALL, NotWhole, by_key, by_name};
 
@@ -121,27 +122,23 @@ fn a_capture_row_reads_back_from_its_bytes() {
 #[test]
 fn a_friction_model_goes_to_the_observer_and_back_unchanged() {
     let settings = ControlSettings::default();
-    let FrictionRecord::Series { bristles, .. } = ModelRecord::default().friction else {
-        panic!("a series element")
-    };
-    for friction in [
-        ModelRecord::default().friction,
-        FrictionRecord::Brush { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.8 },
-        FrictionRecord::Lugre(bristles),
-        FrictionRecord::ModifiedLugre(bristles),
-        FrictionRecord::LugrePatch {
-            sigma0_per_m: 2e5,
-            length_m: 0.01,
-            bristles: BristleRecord { sigma0_n_per_m: 0.0, sigma1_n_s_per_m: 0.0, ..bristles },
-        },
-    ] {
-        assert_eq!(FrictionRecord::from(&ModelParameters::from(&friction)), friction);
+    let elements =
+        ModelKind::ALL.iter().map(|kind| FrictionRecord::from(&FrictionParameters::typical(*kind)));
+    let patch = ModelRecord::default().friction.patch_like(0.01, 88.0).unwrap();
+    for friction in elements.chain([patch]) {
+        assert_eq!(FrictionRecord::from(&friction.parameters().unwrap()), friction);
         let record = ModelRecord { friction, ..ModelRecord::default() };
         assert!(record.prepare(&settings).is_ok());
     }
-    let friction = FrictionRecord::Brush { c_n_per_m: 3e4, mu_s: 0.5, mu_c: 0.8 };
-    let broken = ModelRecord { friction, ..ModelRecord::default() };
-    assert_eq!(broken.prepare(&settings).map_err(|error| error.name), Err("mu_s"));
+    let refused = |friction| {
+        ModelRecord { friction, ..ModelRecord::default() }.prepare(&settings).map_err(|error| error.name)
+    };
+    let brush = FrictionParameters::typical(ModelKind::Brush);
+    assert_eq!(refused((&brush.with("mu_s", 0.5)).into()), Err("mu_s"));
+    let unknown = FrictionRecord { kind: String::try_from("glue").unwrap(), ..(&brush).into() };
+    assert_eq!(refused(unknown), Err("kind"));
+    let short = FrictionRecord { values: heapless::Vec::new(), ..(&brush).into() };
+    assert_eq!(refused(short), Err("brush"));
 }
 
 #[test]
@@ -169,7 +166,11 @@ fn the_longest_model_fits_a_frame() {
         values: heapless::Vec::from_slice(&[1.0; MOST_VALUES]).unwrap(),
     };
     let effects = heapless::Vec::from_slice(&vec![effect; MOST_EFFECTS]).unwrap();
-    let model = ModelRecord { effects, ..ModelRecord::default() };
+    let kind = String::try_from("a".repeat(20).as_str()).unwrap();
+    let friction =
+        FrictionRecord { kind, values: heapless::Vec::from_slice(&[1.0; MOST_PARAMETERS]).unwrap() };
+    let model = ModelRecord { friction, effects };
+    assert!(ModelKind::ALL.iter().all(|kind| kind.name().len() <= 20));
     let request = Request { id: 1, command: Command::ModelSet(model) };
     assert!(encode(&request, &mut [0; MAX_FRAME]).is_ok());
 }

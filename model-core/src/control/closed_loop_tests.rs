@@ -245,16 +245,15 @@ fn the_observer_follows_the_friction_it_has_the_model_of() {
 #[test]
 fn a_wrong_model_shows_in_the_residual_and_the_right_one_takes_it_away() {
     let mut bench = Bench::new().running(&steady(3.0, M2Mode::Speed, 3.0, 3.0));
-    let ModelParameters::Series(mut p) = bench.config.settings().observer.model else { panic!() };
-    p.bristles.stribeck.a0 = 0.4;
-    let wrong = ObserverModel::new(&ModelParameters::Series(p), 0.06, 1e-4).unwrap();
+    let ModelParameters::Elements(p) = bench.config.settings().observer.model else { panic!() };
+    let with_a0 = |a0| ObserverModel::new(&ModelParameters::Elements(p.with("a0", a0)), 0.06, 1e-4).unwrap();
+    let wrong = with_a0(0.4);
     bench.apply(Command::SetModel(&wrong)).unwrap();
     let r = bench.run(1.5).record;
     // 0.1 of 82 N at 0.06 m is 0.49 N·m.
     assert!((r.residual_rms_nm() - 0.49).abs() < 0.03, "{}", r.residual_rms_nm());
     assert!(r.residual_nm > 0.4, "more friction than predicted");
-    p.bristles.stribeck.a0 = 0.5;
-    let right = ObserverModel::new(&ModelParameters::Series(p), 0.06, 1e-4).unwrap();
+    let right = with_a0(0.5);
     bench.apply(Command::SetModel(&right)).unwrap();
     let rms = bench.run(1.4).record.residual_rms_nm();
     assert!(rms < 0.02, "{rms}");

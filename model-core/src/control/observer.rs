@@ -1,7 +1,8 @@
 //! Model observer: what friction should be by the model, from measured speed and normal force, and what is left.
 //!
 //! Three elements touch the disc at 120°, so the model of the whole contact is split into [`N_ELEMENTS`] equal ones:
-//! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. Around
+//! each has a third of the load, of the stiffnesses and of the dampings; coefficients of friction stay. They do the same,
+//! so one is stepped. Around
 //! the three stand the effects of [`crate::extension`] that a diagnosis added: they act on speed, load and friction
 //! coefficient of the contact, and on what the friction channel shows.
 //! A patch is one of [`PATCH_BRISTLES`] bristles for the whole contact. Rubber is taken to run through it at the sliding
@@ -16,11 +17,9 @@
 use super::settings::ObserverSettings;
 use crate::error::ParameterError;
 use crate::extension::{ExtendedFriction, ExtendedInput, ExtendedState, Extensions};
-use crate::friction::brush::BrushParameters;
 use crate::friction::lugre::LugreParameters;
 use crate::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
-use crate::friction::series::SeriesParameters;
-use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
+use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionParameters, FrictionState};
 use core::f32::consts::PI;
 
 /// Elements on the disc.
@@ -35,14 +34,8 @@ pub const PATCH_BRISTLES: usize = 20;
 /// Parameters of a friction model of the whole contact, all elements together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModelParameters {
-    /// Brush with reset.
-    Brush(BrushParameters<f32>),
-    /// LuGre.
-    Lugre(LugreParameters<f32>),
-    /// Modified LuGre as printed.
-    ModifiedLugre(LugreParameters<f32>),
-    /// Rubber block in series with LuGre bristles.
-    Series(SeriesParameters<f32>),
+    /// Elements of a kind.
+    Elements(FrictionParameters<f32>),
     /// LuGre contact patch, for its cost on the chip: model files have no such kind.
     LugrePatch(PatchParameters<f32>),
 }
@@ -57,14 +50,14 @@ enum Rubber {
 /// What the rubber remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum RubberState {
-    Elements([FrictionState<f32>; N_ELEMENTS]),
+    Element(FrictionState<f32>),
     Patch(PatchState<f32, PATCH_BRISTLES>),
 }
 
 impl Rubber {
     fn rest(&self) -> RubberState {
         match self {
-            Self::Element(element) => RubberState::Elements([element.rest(); N_ELEMENTS]),
+            Self::Element(element) => RubberState::Element(element.rest()),
             Self::Patch(_) => RubberState::Patch(PatchState::default()),
         }
     }
@@ -73,18 +66,13 @@ impl Rubber {
     #[inline(always)]
     fn step(&self, state: &mut RubberState, whole: &Contact<f32>) -> FrictionForce<f32> {
         match (self, &mut *state) {
-            (Self::Element(element), RubberState::Elements(elements)) => {
+            (Self::Element(element), RubberState::Element(state)) => {
                 let load_n = whole.normal_force_n * (1.0 / N_ELEMENTS as f32);
                 let part = Contact { normal_force_n: load_n, ..*whole };
-                let mut sum = FrictionForce::default();
-                for state in elements {
-                    let one = element.step(state, &part);
-                    sum = FrictionForce {
-                        force_n: sum.force_n + one.force_n,
-                        tip_speed_m_s: one.tip_speed_m_s,
-                    };
-                }
-                sum
+                // Equal elements under equal loads do the same to the last bit, so one is stepped and counted for all.
+                let one = element.step(state, &part);
+                let force_n = (0..N_ELEMENTS).fold(0.0, |sum, _| sum + one.force_n);
+                FrictionForce { force_n, ..one }
             }
             (Self::Patch(patch), RubberState::Patch(bristles)) => FrictionForce {
                 force_n: patch.step(bristles, whole, whole.sliding_speed_m_s),
@@ -106,12 +94,10 @@ pub struct ObserverModel {
 }
 
 impl ModelParameters {
+    /// The whole contact as one element.
     fn prepare(&self, tick_s: f32) -> Result<FrictionModel<f32>, ParameterError> {
         match self {
-            Self::Brush(p) => FrictionModel::brush(p, tick_s),
-            Self::Lugre(p) => FrictionModel::lugre(p, tick_s),
-            Self::ModifiedLugre(p) => FrictionModel::modified_lugre(p, tick_s),
-            Self::Series(p) => FrictionModel::series(p, tick_s),
+            Self::Elements(p) => p.model(tick_s),
             // What stands for it where the effects ask for a model: the same curve.
             Self::LugrePatch(p) => FrictionModel::lugre(
                 &LugreParameters {
@@ -129,28 +115,7 @@ impl ModelParameters {
     fn rubber(&self, tick_s: f32) -> Result<Rubber, ParameterError> {
         match self {
             Self::LugrePatch(p) => LugrePatch::new(p, tick_s).map(Rubber::Patch),
-            _ => self.share().prepare(tick_s).map(Rubber::Element),
-        }
-    }
-
-    /// One of [`N_ELEMENTS`] equal elements.
-    fn share(&self) -> Self {
-        let share = 1.0 / N_ELEMENTS as f32;
-        let bristles = |p: &LugreParameters<f32>| LugreParameters {
-            sigma0_n_per_m: p.sigma0_n_per_m * share,
-            sigma1_n_s_per_m: p.sigma1_n_s_per_m * share,
-            ..*p
-        };
-        match self {
-            Self::Brush(p) => Self::Brush(BrushParameters { c_n_per_m: p.c_n_per_m * share, ..*p }),
-            Self::Lugre(p) => Self::Lugre(bristles(p)),
-            Self::ModifiedLugre(p) => Self::ModifiedLugre(bristles(p)),
-            Self::Series(p) => Self::Series(SeriesParameters {
-                k_u_n_per_m: p.k_u_n_per_m * share,
-                c_u_n_s_per_m: p.c_u_n_s_per_m * share,
-                bristles: bristles(&p.bristles),
-            }),
-            Self::LugrePatch(p) => Self::LugrePatch(*p),
+            Self::Elements(p) => p.share(1.0 / N_ELEMENTS as f32).model(tick_s).map(Rubber::Element),
         }
     }
 }
@@ -296,6 +261,7 @@ mod tests {
     use super::super::settings::ControlSettings;
     use super::*;
     use crate::extension::Extension;
+    use crate::friction::ModelKind;
     use core::f32::consts::TAU;
 
     const TICK_S: f32 = 1e-4;
@@ -318,8 +284,7 @@ mod tests {
 
     /// LuGre slides steadily after microseconds: T = r F_N g(v).
     fn lugre() -> ModelParameters {
-        let ModelParameters::Series(p) = ControlSettings::default().observer.model else { panic!() };
-        ModelParameters::Lugre(p.bristles)
+        ModelParameters::Elements(FrictionParameters::typical(ModelKind::Lugre))
     }
 
     fn steady_nm() -> f64 {
@@ -328,14 +293,8 @@ mod tests {
 
     #[test]
     fn each_model_split_into_three_gives_the_friction_of_the_whole() {
-        let ModelParameters::Series(p) = ControlSettings::default().observer.model else { panic!() };
-        let brush = BrushParameters { c_n_per_m: 3e4, mu_s: 1.2, mu_c: 0.9 };
-        for whole in [
-            ModelParameters::Series(p),
-            ModelParameters::Lugre(p.bristles),
-            ModelParameters::ModifiedLugre(p.bristles),
-            ModelParameters::Brush(brush),
-        ] {
+        for kind in ModelKind::ALL {
+            let whole = ModelParameters::Elements(FrictionParameters::typical(*kind));
             let model = whole.prepare(TICK_S).unwrap();
             let contact = Contact::new(0.18, 88.0);
             // In the middle of the transient, where stiffness and damping count.
@@ -354,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_patch_in_the_observer_gives_the_friction_of_the_patch() {
-        let ModelParameters::Lugre(bristles) = lugre() else { panic!() };
+        let bristles = FrictionParameters::typical(ModelKind::Lugre).bristles().unwrap();
         let p = PatchParameters {
             sigma0_per_m: 2e5,
             a2_s_per_m: 0.0,

@@ -8,9 +8,7 @@
 //! three can be told apart. All codes are of a 16 bit converter, 0 … 65535 for 0 … 3.3 V.
 
 use super::observer::ModelParameters;
-use crate::friction::lugre::LugreParameters;
-use crate::friction::series::SeriesParameters;
-use crate::friction::stribeck::StribeckParameters;
+use crate::friction::{FrictionParameters, ModelKind};
 
 /// Everything that can be set.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -296,16 +294,7 @@ impl Default for ControlSettings {
 
 /// The assumed contact: rubber block in series with LuGre bristles.
 fn default_model() -> ModelParameters {
-    ModelParameters::Series(SeriesParameters {
-        k_u_n_per_m: 3e4,
-        c_u_n_s_per_m: 160.0,
-        bristles: LugreParameters {
-            sigma0_n_per_m: 1.76e7,
-            sigma1_n_s_per_m: 0.0,
-            a2_s_per_m: 0.0,
-            stribeck: StribeckParameters { a0: 0.5, a1: 0.7, v0_m_s: 0.5, delta: 0.5, theta: 1.0 },
-        },
-    })
+    ModelParameters::Elements(FrictionParameters::typical(ModelKind::Series))
 }
 
 impl Default for DriveSettings {

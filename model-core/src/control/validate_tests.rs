@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::error::ParameterError;
+use crate::friction::{FrictionParameters, ModelKind};
 use std::collections::BTreeSet;
 use std::string::{String, ToString as _};
 
@@ -174,9 +175,8 @@ fn a_refusal_names_the_setting_the_value_and_the_range() {
         message(|s| s.observer.bridge_lowpass_hz = 5000.0),
         "observer.bridge_lowpass_hz = 5000 is not allowed; allowed: 0.0 … 4000.0 Hz"
     );
-    let ModelParameters::Series(mut p) = ControlSettings::default().observer.model else { panic!() };
-    p.k_u_n_per_m = -1.0;
-    let error = build(|s| s.observer.model = ModelParameters::Series(p)).unwrap_err();
+    let p = FrictionParameters::typical(ModelKind::Series).with("k_u_n_per_m", -1.0);
+    let error = build(|s| s.observer.model = ModelParameters::Elements(p)).unwrap_err();
     assert_eq!(error.name, "k_u_n_per_m");
 }
 

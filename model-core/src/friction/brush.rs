@@ -13,7 +13,9 @@
 //!
 //! The force needs no damping term: the block is massless, and eq. 4 has none.
 
+use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
+use super::element::{Element, ParameterSpec, exactly};
 use super::lugre::require_step;
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -95,5 +97,73 @@ impl<T: Real> Brush<T> {
             let side = if v == T::ZERO { state.deformation_m } else { v };
             state.deformation_m = (load * self.mu_c * self.compliance).copysign(side);
         }
+    }
+}
+
+impl<T: Real> BrushParameters<T> {
+    /// In the order of [`Element::PARAMETERS`].
+    pub(super) fn values(&self) -> [T; 3] {
+        [self.c_n_per_m, self.mu_s, self.mu_c]
+    }
+
+    /// From as many values in that order.
+    pub(super) fn from_values(values: &[T]) -> Result<Self, ParameterError> {
+        let [c_n_per_m, mu_s, mu_c] = exactly(values)?;
+        Ok(Self { c_n_per_m, mu_s, mu_c })
+    }
+}
+
+impl<T: Real> FrictionModel<T> {
+    /// A brush element.
+    pub fn brush(p: &BrushParameters<T>, step_s: T) -> Result<Self, ParameterError> {
+        Brush::new(p, step_s).map(Self::Brush)
+    }
+}
+
+impl<T: Real> Element<T> for Brush<T> {
+    type State = BrushState<T>;
+
+    const PARAMETERS: &'static [ParameterSpec] = &[
+        ParameterSpec::required("c_n_per_m", 3e4).searched(1e3, 1e9).extensive(),
+        ParameterSpec::required("mu_s", 1.2).searched(0.02, 5.0),
+        ParameterSpec::required("mu_c", 0.9).searched(0.02, 5.0),
+    ];
+
+    fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {
+        Self::new(&BrushParameters::from_values(values)?, step_s)
+    }
+
+    fn rest(&self) -> BrushState<T> {
+        BrushState::default()
+    }
+
+    fn holding(&self, force_n: T, contact: &Contact<T>) -> BrushState<T> {
+        let most_n = contact.load_n() * self.mu_s;
+        BrushState {
+            deformation_m: (force_n * self.compliance).within(most_n * self.compliance),
+            slipping: force_n.abs() >= most_n,
+        }
+    }
+
+    #[inline]
+    fn set_step_s(&mut self, step_s: T) {
+        self.set_step_s(step_s);
+    }
+
+    #[inline]
+    fn step(&self, state: &mut BrushState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+        self.step(state, contact)
+    }
+
+    fn deformation_m(state: &BrushState<T>) -> T {
+        state.deformation_m
+    }
+
+    fn largest_coefficient(&self) -> T {
+        self.mu_s
+    }
+
+    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
+        self.stiffness
     }
 }

@@ -10,7 +10,9 @@
 //! Left out: wear, temperature and everything else that changes g in time; see
 //! [`Contact::road_factor`]. Without load the bristles spring back at once (z = 0).
 
+use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
+use super::element::{Element, ParameterSpec, exactly};
 use super::stribeck::{Stribeck, StribeckParameters};
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -162,5 +164,108 @@ impl<T: Real> Lugre<T> {
             force_n: self.sigma0 * next + self.sigma1 * deflection_rate + load * self.a2 * v,
             tip_speed_m_s: v,
         }
+    }
+}
+
+/// Parameters of LuGre's bristles, which other models have too.
+pub(super) const PARAMETERS: &[ParameterSpec] = &BRISTLES;
+
+const BRISTLES: [ParameterSpec; 8] = [
+    ParameterSpec::required("sigma0_n_per_m", 1.76e7).searched(1e4, 1e9).extensive(),
+    ParameterSpec::optional("sigma1_n_s_per_m", 0.0).extensive(),
+    ParameterSpec::required("a0", 0.5).searched(0.02, 5.0),
+    ParameterSpec::required("a1", 0.7).searched(0.0, 4.0),
+    ParameterSpec::optional("a2_s_per_m", 0.0).searched(0.0, 3.0),
+    ParameterSpec::required("v0_m_s", 0.5).searched(2e-3, 10.0),
+    ParameterSpec::optional("delta", 0.5),
+    ParameterSpec::optional("theta", 1.0),
+];
+
+/// The bristles' parameters followed by those of what carries them; `N` is the number of all.
+pub(super) const fn and_bristles<const M: usize, const N: usize>(
+    more: [ParameterSpec; M],
+) -> [ParameterSpec; N] {
+    let mut all = [BRISTLES[0]; N];
+    let mut k = 0;
+    while k < N {
+        all[k] = if k < BRISTLES.len() { BRISTLES[k] } else { more[k - BRISTLES.len()] };
+        k += 1;
+    }
+    all
+}
+
+/// The bristles and the `M` values that follow them.
+pub(super) fn bristles_and<T: Real, const M: usize>(
+    values: &[T],
+) -> Result<(LugreParameters<T>, [T; M]), ParameterError> {
+    let (bristles, more) = values.split_at(values.len().min(BRISTLES.len()));
+    Ok((LugreParameters::from_values(bristles)?, exactly(more)?))
+}
+
+impl<T: Real> LugreParameters<T> {
+    /// In the order of [`Element::PARAMETERS`].
+    pub(super) fn values(&self) -> [T; 8] {
+        let s = &self.stribeck;
+        let (sigma0, sigma1, a2) = (self.sigma0_n_per_m, self.sigma1_n_s_per_m, self.a2_s_per_m);
+        [sigma0, sigma1, s.a0, s.a1, a2, s.v0_m_s, s.delta, s.theta]
+    }
+
+    /// From as many values in that order.
+    pub(super) fn from_values(values: &[T]) -> Result<Self, ParameterError> {
+        let [sigma0_n_per_m, sigma1_n_s_per_m, a0, a1, a2_s_per_m, v0_m_s, delta, theta] = exactly(values)?;
+        let stribeck = StribeckParameters { a0, a1, v0_m_s, delta, theta };
+        Ok(Self { sigma0_n_per_m, sigma1_n_s_per_m, a2_s_per_m, stribeck })
+    }
+}
+
+impl<T: Real> FrictionModel<T> {
+    /// A LuGre element.
+    pub fn lugre(p: &LugreParameters<T>, step_s: T) -> Result<Self, ParameterError> {
+        Lugre::new(p, step_s).map(Self::Lugre)
+    }
+}
+
+impl<T: Real> Element<T> for Lugre<T> {
+    type State = LugreState<T>;
+
+    const PARAMETERS: &'static [ParameterSpec] = PARAMETERS;
+
+    fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {
+        Self::new(&LugreParameters::from_values(values)?, step_s)
+    }
+
+    fn rest(&self) -> LugreState<T> {
+        LugreState::default()
+    }
+
+    fn holding(&self, force_n: T, contact: &Contact<T>) -> LugreState<T> {
+        let most_m = self.largest_deflection_m(contact.load_n());
+        LugreState { deflection_m: (force_n * self.inverse_sigma0).within(most_m) }
+    }
+
+    #[inline]
+    fn set_step_s(&mut self, step_s: T) {
+        self.set_step_s(step_s);
+    }
+
+    #[inline]
+    fn step(&self, state: &mut LugreState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+        self.step(state, contact)
+    }
+
+    fn deformation_m(state: &LugreState<T>) -> T {
+        state.deflection_m
+    }
+
+    fn largest_coefficient(&self) -> T {
+        self.stribeck.largest()
+    }
+
+    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
+        self.sigma0
+    }
+
+    fn stribeck(&self) -> Option<&Stribeck<T>> {
+        Some(&self.stribeck)
     }
 }

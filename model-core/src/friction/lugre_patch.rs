@@ -14,7 +14,7 @@
 
 use super::contact::Contact;
 use super::lugre::{LugreParameters, require_step};
-use super::modified_lugre::{ModifiedLugre, ModifiedLugreState};
+use super::modified_lugre::{ModifiedLugre, ModifiedLugreState, Scheme};
 use super::stribeck::{Stribeck, StribeckParameters};
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -192,6 +192,12 @@ impl<T: Real, const N: usize> ModifiedLugrePatch<T, N> {
             transport: Transport::new(N, length_m, largest_transport_speed_m_s, step_s)?,
             share,
         })
+    }
+
+    /// The same patch with another reading of the rate in eq. 17, or another treatment of the implicit equation.
+    #[must_use]
+    pub fn with_scheme(self, scheme: Scheme) -> Self {
+        Self { element: self.element.with_scheme(scheme), ..self }
     }
 
     /// Advances the patch by one step; returns the friction force, N.

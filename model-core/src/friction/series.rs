@@ -17,10 +17,16 @@
 //! roots: the fold of stick-slip. The root is searched from the last tip speed in the one direction in
 //! which φ falls to zero, so it stays on the branch it was on and jumps only when that branch ends.
 //!
+//! Rubber that relaxes ([`super::series_zener`]) has Maxwell branches beside k_u: linear in the
+//! block's rate, so they only add to the two numbers of the block's side.
+//!
 //! Left out: the mass of the block, and the spread of deformation over its cross-section.
 
+use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
-use super::lugre::{Lugre, LugreParameters};
+use super::element::{Element, ParameterSpec, exactly};
+use super::lugre::{Lugre, LugreParameters, and_bristles};
+use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
 use crate::real::Real;
 
@@ -37,7 +43,7 @@ pub struct SeriesParameters<T> {
 
 /// Series element, prepared for a step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Series<T> {
+pub struct Series<T, const N: usize = 0> {
     k_u: T,
     c_u: T,
     lugre: Lugre<T>,
@@ -45,6 +51,18 @@ pub struct Series<T> {
     weights: Weights<T>,
     inverse_step: T,
     sigma1_per_step: T,
+    branches: [Branch<T>; N],
+}
+
+/// A Maxwell branch beside block and damper, ḟ = k u̇ − f/τ, over a step of held u̇.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Branch<T> {
+    stiffness: T,
+    inverse_time: T,
+    /// What is left of its force after a step.
+    decay: T,
+    /// Force per rate of the block, N·s/m.
+    gain: T,
 }
 
 /// How the end of a step weighs in the block's motion over it.
@@ -60,8 +78,8 @@ struct Weights<T> {
 }
 
 /// State of the series element.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SeriesState<T> {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeriesState<T, const N: usize = 0> {
     /// Block deformation u, m.
     pub deformation_m: T,
     /// Bristle deflection z, m.
@@ -76,6 +94,23 @@ pub struct SeriesState<T> {
     pub mean_root_speed_m_s: T,
     /// Length of the last step, s; zero before the first.
     pub last_step_s: T,
+    /// Forces of the Maxwell branches, N.
+    pub branch_n: [T; N],
+}
+
+impl<T: Real, const N: usize> Default for SeriesState<T, N> {
+    fn default() -> Self {
+        Self {
+            deformation_m: T::ZERO,
+            deflection_m: T::ZERO,
+            tip_speed_m_s: T::ZERO,
+            deflection_rate_m_s: T::ZERO,
+            mean_tip_speed_m_s: T::ZERO,
+            mean_root_speed_m_s: T::ZERO,
+            last_step_s: T::ZERO,
+            branch_n: [T::ZERO; N],
+        }
+    }
 }
 
 /// φ and what follows from the same evaluation.
@@ -110,6 +145,18 @@ const MOST_ITERATIONS: u32 = 30;
 impl<T: Real> Series<T> {
     /// Prepares the element for a step of `step_s` seconds, or names the parameter out of range.
     pub fn new(p: &SeriesParameters<T>, step_s: T) -> Result<Self, ParameterError> {
+        Self::with_branches(p, [], step_s)
+    }
+}
+
+impl<T: Real, const N: usize> Series<T, N> {
+    /// As [`Series::new`] with Maxwell branches of given stiffness (N/m) and relaxation time (s) beside the block. The
+    /// caller has checked these.
+    pub(super) fn with_branches(
+        p: &SeriesParameters<T>,
+        branches: [(T, T); N],
+        step_s: T,
+    ) -> Result<Self, ParameterError> {
         let k_allowed = p.k_u_n_per_m >= T::ONE && p.k_u_n_per_m <= T::from_f64(1e9);
         let k_u = require("k_u_n_per_m", p.k_u_n_per_m, k_allowed, "1 to 1e9 N/m")?;
         let c_allowed = p.c_u_n_s_per_m >= T::from_f64(1e-3) && p.c_u_n_s_per_m <= T::from_f64(1e6);
@@ -122,6 +169,12 @@ impl<T: Real> Series<T> {
             weights: Weights::default(),
             inverse_step: T::ONE,
             sigma1_per_step: T::ZERO,
+            branches: branches.map(|(stiffness, time_s)| Branch {
+                stiffness,
+                inverse_time: T::ONE / time_s,
+                decay: T::ONE,
+                gain: T::ZERO,
+            }),
         };
         element.set_step_s(step_s);
         Ok(element)
@@ -131,9 +184,32 @@ impl<T: Real> Series<T> {
     #[inline]
     pub fn set_step_s(&mut self, step_s: T) {
         self.lugre.set_step_s(step_s);
+        for branch in &mut self.branches {
+            let gone = -(-(step_s * branch.inverse_time)).exp_m1();
+            branch.decay = T::ONE - gone;
+            branch.gain = branch.stiffness * gone / branch.inverse_time;
+        }
         self.weights = self.weights(T::HALF);
         self.inverse_step = T::ONE / step_s;
         self.sigma1_per_step = self.lugre.sigma1 * self.inverse_step;
+    }
+
+    /// The state that carries `force_n` at rest, its branches relaxed.
+    pub(super) fn held(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T, N> {
+        let held = force_n.within(contact.load_n() * self.lugre.stribeck.largest());
+        SeriesState {
+            deformation_m: held / self.k_u,
+            deflection_m: held * self.lugre.inverse_sigma0,
+            tip_speed_m_s: contact.sliding_speed_m_s,
+            mean_tip_speed_m_s: contact.sliding_speed_m_s,
+            mean_root_speed_m_s: contact.sliding_speed_m_s,
+            ..SeriesState::default()
+        }
+    }
+
+    /// Stiffness against a motion too quick for the branches to relax, N/m.
+    pub(super) fn unrelaxed_stiffness_n_per_m(&self) -> T {
+        self.branches.iter().fold(self.k_u, |sum, branch| sum + branch.stiffness)
     }
 
     /// The bristles at the tip.
@@ -160,7 +236,8 @@ impl<T: Real> Series<T> {
 
     fn weights(&self, memory: T) -> Weights<T> {
         let share = T::ONE / (T::ONE + memory);
-        let impedance = self.k_u * self.lugre.step_s * share + self.c_u;
+        let branches = self.branches.iter().fold(T::ZERO, |sum, branch| sum + branch.gain);
+        let impedance = (self.k_u * self.lugre.step_s + branches) * share + self.c_u;
         Weights { memory, share, impedance, inverse_impedance: T::ONE / impedance }
     }
 
@@ -187,7 +264,7 @@ impl<T: Real> Series<T> {
     }
 
     /// Advances block and bristles by one step and returns the friction force.
-    pub fn step(&self, state: &mut SeriesState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+    pub fn step(&self, state: &mut SeriesState<T, N>, contact: &Contact<T>) -> FrictionForce<T> {
         let v_root = contact.sliding_speed_m_s;
         let load_n = contact.load_n();
         let step_s = self.lugre.step_s;
@@ -202,7 +279,10 @@ impl<T: Real> Series<T> {
         } else {
             v_root + weights.memory * (v_root - state.mean_root_speed_m_s)
         };
-        let drive_n = self.k_u * free_m + self.c_u * root_end;
+        let mut drive_n = self.k_u * free_m + self.c_u * root_end;
+        for (branch, force_n) in self.branches.iter().zip(&state.branch_n) {
+            drive_n += branch.decay * *force_n + branch.gain * (v_root - left);
+        }
         let (v, deflection_m, force_n) = if load_n <= T::ZERO {
             // Off the road the block relaxes: k_u u + c_u u̇ = 0.
             (drive_n * weights.inverse_impedance, T::ZERO, T::ZERO)
@@ -227,6 +307,10 @@ impl<T: Real> Series<T> {
             let (v, balance) = self.solve(state, &load);
             (v, balance.deflection_m, balance.bristle_force_n)
         };
+        let mut branch_n = state.branch_n;
+        for (branch, force_n) in self.branches.iter().zip(&mut branch_n) {
+            *force_n = branch.decay * *force_n + branch.gain * (v_root - left - weights.share * v);
+        }
         let deflection_rate_m_s = (deflection_m - state.deflection_m) * self.inverse_step;
         *state = SeriesState {
             deflection_rate_m_s,
@@ -236,6 +320,7 @@ impl<T: Real> Series<T> {
             mean_tip_speed_m_s: left + weights.share * v,
             mean_root_speed_m_s: v_root,
             last_step_s: step_s,
+            branch_n,
         };
         FrictionForce { force_n, tip_speed_m_s: v }
     }
@@ -245,9 +330,11 @@ impl<T: Real> Series<T> {
     /// φ has a kink at v = 0, where its value is known without any function call. Newton would
     /// jump to and fro across it, so the search keeps to the side on which the root lies.
     #[inline]
-    fn solve(&self, state: &SeriesState<T>, load: &Load<T>) -> (T, Balance<T>) {
+    fn solve(&self, state: &SeriesState<T, N>, load: &Load<T>) -> (T, Balance<T>) {
         let z = state.deflection_m;
-        let tolerance = T::from_f64(4.0) * T::EPSILON * (load.drive_n.abs() + load.load_n);
+        // In f32 what rounding allows; in f64 a bound that one Newton step from the last tip speed reaches in calm motion.
+        let relative = (T::from_f64(4.0) * T::EPSILON).at_least(T::from_f64(1e-12));
+        let tolerance = relative * (load.drive_n.abs() + load.load_n);
         let resting_m = load.carried_m / load.lead;
         let at_rest = self.lugre.sigma0 * resting_m + self.sigma1_per_step * (resting_m - z) - load.drive_n;
         let mut v = state.tip_speed_m_s;
@@ -307,5 +394,78 @@ impl<T: Real> Series<T> {
             }
         }
         (v, at)
+    }
+}
+
+impl<T: Real> SeriesParameters<T> {
+    /// In the order of [`Element::PARAMETERS`].
+    pub(super) fn values(&self) -> [T; 10] {
+        let [a, b, c, d, e, f, g, h] = self.bristles.values();
+        [a, b, c, d, e, f, g, h, self.k_u_n_per_m, self.c_u_n_s_per_m]
+    }
+
+    /// From as many values in that order.
+    pub(super) fn from_values(values: &[T]) -> Result<Self, ParameterError> {
+        let [bristles @ .., k_u_n_per_m, c_u_n_s_per_m] = exactly::<T, 10>(values)?;
+        let bristles = LugreParameters::from_values(&bristles)?;
+        Ok(Self { k_u_n_per_m, c_u_n_s_per_m, bristles })
+    }
+}
+
+impl<T: Real> FrictionModel<T> {
+    /// A series element.
+    pub fn series(p: &SeriesParameters<T>, step_s: T) -> Result<Self, ParameterError> {
+        Series::new(p, step_s).map(Self::Series)
+    }
+}
+
+impl<T: Real> Element<T> for Series<T> {
+    type State = SeriesState<T>;
+
+    const PARAMETERS: &'static [ParameterSpec] = &and_bristles::<2, 10>([
+        ParameterSpec::required("k_u_n_per_m", 3e4).searched(1e3, 1e6).extensive(),
+        ParameterSpec::required("c_u_n_s_per_m", 160.0).searched(2.0, 1e4).extensive(),
+    ]);
+
+    fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {
+        Self::new(&SeriesParameters::from_values(values)?, step_s)
+    }
+
+    fn rest(&self) -> SeriesState<T> {
+        SeriesState::default()
+    }
+
+    fn holding(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T> {
+        self.held(force_n, contact)
+    }
+
+    #[inline]
+    fn set_step_s(&mut self, step_s: T) {
+        self.set_step_s(step_s);
+    }
+
+    #[inline]
+    fn step(&self, state: &mut SeriesState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+        self.step(state, contact)
+    }
+
+    fn deformation_m(state: &SeriesState<T>) -> T {
+        state.deformation_m
+    }
+
+    fn largest_coefficient(&self) -> T {
+        self.lugre.stribeck.largest()
+    }
+
+    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
+        self.k_u
+    }
+
+    fn stribeck(&self) -> Option<&Stribeck<T>> {
+        Some(&self.lugre.stribeck)
+    }
+
+    fn block_time_s(&self) -> Option<T> {
+        Some(self.c_u / self.k_u)
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use rig_tests::{Base, Effect, Form, Plan, Scenario, generate};
+use rig_tests::{Base, Effect, Form, Imperfection, LawFamily, Plan, Scenario, generate};
 
 #[derive(Parser)]
 #[command(about = "Make logs with hidden effects")]
@@ -35,8 +35,14 @@ struct Arguments {
     #[arg(long, default_value_t = 20.0)]
     duration_s: f64,
     /// Relative error of the rig file
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.05)]
     rig_file_error: f64,
+    /// Laws behind the effects: those to develop on, or the one kept for a final table
+    #[arg(long, value_enum, default_value_t = LawFamily::Common)]
+    laws: LawFamily,
+    /// Hum, bounce, missing samples, jitter
+    #[arg(long, value_enum, default_value_t = Imperfection::Mild)]
+    imperfections: Imperfection,
     /// Add a surface temperature
     #[arg(long)]
     temperature: bool,
@@ -72,6 +78,8 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         plan: arguments.plan,
         duration_s: arguments.duration_s,
         rig_file_error: arguments.rig_file_error,
+        laws: arguments.laws,
+        imperfection: arguments.imperfections,
         temperature_sensor: arguments.temperature,
         ..Scenario::new(&effects, arguments.seed)
     };

@@ -1,62 +1,108 @@
-//! Hides effects in logs, has them diagnosed, prints who was named: the confusion table.
+//! Hides effects in logs, has them diagnosed, prints who was named with exact intervals.
 //!
 //! The diagnosis is the command `rig diagnose`, run on files; this program knows the answer, that one does not.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
-use std::time::Instant;
+use std::process::ExitCode;
 
 use clap::Parser;
-use rig_tests::trial::{Answer, Confusion};
-use rig_tests::{Base, Effect, Form, Scenario, generate};
+use rig_tests::trial::campaign::{Commit, Shard, Wanted};
+use rig_tests::trial::record::Record;
+use rig_tests::trial::run::Runner;
+use rig_tests::trial::{coverage, table};
+use rig_tests::{Base, Effect, Form, Imperfection, LawFamily, Plan, Scenario};
 
-/// Hide effects in logs, diagnose them, print the confusion table
+/// Hide effects in logs, diagnose them, print how often the answer is right
 #[derive(Parser)]
 #[command(
     name = "rig trials",
     after_long_help = "\
 Examples:
-  rig trials --seeds 2
-  rig trials --seeds 5 --effects thermal_fade wear_drift
-  rig trials --effects thermal_fade+m2_ripple
-  rig trials --seeds 3 --singles --noise 3
+  rig trials --rounds 2 --jobs 2
+  rig trials --rounds 5 --effects thermal_fade wear_drift
+  rig trials --effects thermal_fade+m2_ripple --exact-seed 180012 --keep DIR
+  rig trials --rounds 4 --laws reserved --seeds-from-commit        a table to publish
+  rig trials --rounds 4 --case 3/20 --json-lines shard3.jsonl      one of 20 shards
+  rig trials --collect shard*.jsonl                                their table
+  rig trials --fit-coverage 200                                    intervals of rig fit
 
 Without --singles, --effects, --pairs, --outside and --none all of them are tried."
 )]
 struct Arguments {
-    /// Seeds for each effect
-    #[arg(long, default_value_t = 2)]
-    seeds: u64,
-    /// First seed
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
+    /// Rounds: so many cases of each effect (each with a rig, a plan, a law and noise of its own)
+    #[arg(long, default_value_t = 2, alias = "seeds")]
+    rounds: u64,
+    /// Number of the first round, which decides the seeds
+    #[arg(long, default_value_t = 1, alias = "first-seed")]
+    first_round: u64,
+    /// Take the first round's number from the hash of this commit, so that nothing can be tuned on the cases;
+    /// it must be checked out, with no change
+    #[arg(long, value_name = "HASH", num_args = 0..=1, default_missing_value = "HEAD", conflicts_with = "first_round")]
+    seeds_from_commit: Option<String>,
+    /// Take seeds from a commit though the sources differ from it; the table says so
+    #[arg(long)]
+    allow_dirty: bool,
+    /// Take exactly this seed for every case, to see one again
+    #[arg(long, value_name = "SEED", conflicts_with = "seeds_from_commit")]
+    exact_seed: Option<u64>,
     /// Each effect that can be named, alone
     #[arg(long)]
     singles: bool,
     /// Only these effects; some at once are joined by +, as thermal_fade+m2_ripple
     #[arg(long, value_name = "ID", num_args = 1..)]
     effects: Vec<String>,
-    /// Two effects at once: so many random pairs for each seed
+    /// Two effects at once: so many random pairs in each round
     #[arg(long, value_name = "COUNT", num_args = 0..=1, default_missing_value = "10")]
     pairs: Option<u64>,
     /// Effects that are not in the library
     #[arg(long)]
     outside: bool,
-    /// No effect: so many logs for each seed
-    #[arg(long, value_name = "COUNT", num_args = 0..=1, default_missing_value = "1")]
+    /// No effect: so many cases in each round
+    #[arg(long, value_name = "COUNT", num_args = 0..=1, default_missing_value = "5")]
     none: Option<u64>,
+    /// Laws behind the effects: those to develop on, or the one of each effect that is kept for a final table
+    #[arg(long, value_enum, default_value_t = LawFamily::Common)]
+    laws: LawFamily,
     /// Rate of the logs
     #[arg(long, default_value_t = 1000.0)]
     rate_hz: f64,
     /// Factor on the noise of all sensors
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
+    /// Hum, bounce, missing samples, jitter
+    #[arg(long, value_enum, default_value_t = Imperfection::Mild)]
+    imperfections: Imperfection,
+    /// Relative error of the rig file
+    #[arg(long, default_value_t = 0.05)]
+    rig_file_error: f64,
     /// What is logged
     #[arg(long, value_enum, default_value_t = Form::Contact)]
     form: Form,
     /// Friction model behind the logs
     #[arg(long, value_enum, default_value_t = Base::BySeed)]
     base: Base,
+    /// Which motions are run
+    #[arg(long, value_enum, default_value_t = Plan::Drawn)]
+    plan: Plan,
+    /// Length of each log where the plan is random
+    #[arg(long, default_value_t = 20.0)]
+    duration_s: f64,
+    /// Cases at a time; each diagnosis gets its share of the cores
+    #[arg(long, default_value_t = 1)]
+    jobs: usize,
+    /// Run one shard of the cases only: the i-th of n
+    #[arg(long, value_name = "I/N")]
+    case: Option<Shard>,
+    /// Write one line of JSON for each case to this file
+    #[arg(long, value_name = "FILE")]
+    json_lines: Option<PathBuf>,
+    /// Run nothing: make the table from lines that shards wrote
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    collect: Vec<PathBuf>,
+    /// Instead of diagnoses: so many fits of clean logs, and how many of their 95 % intervals hold the truth
+    #[arg(long, value_name = "COUNT")]
+    fit_coverage: Option<usize>,
     /// Keep the cases and the results in this folder
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
@@ -73,56 +119,93 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let rig = rig_command()?;
-    let folder = arguments
-        .keep
-        .clone()
-        .unwrap_or_else(|| std::env::temp_dir().join(format!("rig-trials-{}", std::process::id())));
-    let cases = cases(arguments)?;
-    let mut confusion = Confusion::default();
-    for (done, (effects, seed)) in cases.iter().enumerate() {
-        let names: Vec<&str> = effects.iter().map(|effect| effect.id()).collect();
-        let name = format!("{}-{seed}", if names.is_empty() { "none".into() } else { names.join("+") });
-        let here = folder.join(&name);
-        let started = Instant::now();
-        let answer = trial(arguments, &rig, effects, *seed, &here);
-        let wall_s = started.elapsed().as_secs_f64();
-        if let Err(why) = &answer {
-            eprintln!("{name}: {why}");
-        }
-        let answer = answer.ok();
-        let right = answer.as_ref().is_some_and(|answer| answer.is_right(effects));
-        let words = answer.as_ref().map_or("no answer".into(), Answer::words);
-        eprintln!(
-            "{:>4}/{} {} {name}: {words} ({wall_s:.0} s)",
-            done + 1,
-            cases.len(),
-            if right { "right" } else { "WRONG" }
-        );
-        confusion.add(effects, answer.as_ref(), wall_s);
-        if arguments.keep.is_none() {
-            std::fs::remove_dir_all(&here).map_err(|e| format!("{}: {e}", here.display()))?;
-        }
+    if !arguments.collect.is_empty() {
+        print!("{}", table::table(&table::collect(read_lines(&arguments.collect)?)?));
+        return Ok(());
     }
-    if arguments.keep.is_none() {
+    let (wanted, campaign) = campaign(arguments)?;
+    let runner = Runner {
+        rig: Runner::command()?,
+        folder: arguments
+            .keep
+            .clone()
+            .unwrap_or_else(|| std::env::temp_dir().join(format!("rig-trials-{}", std::process::id()))),
+        keep: arguments.keep.is_some(),
+        jobs: arguments.jobs.max(1),
+    };
+    let result = match arguments.fit_coverage {
+        Some(count) => {
+            println!("{campaign}");
+            fits(&runner, &wanted, count);
+            Ok(())
+        }
+        None => cases(arguments, &runner, &wanted, &campaign),
+    };
+    if !runner.keep {
         // It is empty; where it is not, somebody else's files stay.
-        let _ = std::fs::remove_dir(&folder);
+        let _ = std::fs::remove_dir(&runner.folder);
     }
-    print!("{}", confusion.table());
-    Ok(())
+    result
 }
 
-/// The tool under trial: `RIG_BIN`, or the one built beside this program.
-fn rig_command() -> Result<PathBuf, String> {
-    if let Some(path) = std::env::var_os("RIG_BIN") {
-        return Ok(PathBuf::from(path));
-    }
-    let own = std::env::current_exe().map_err(|e| e.to_string())?;
-    let beside = own.with_file_name(format!("rig{}", std::env::consts::EXE_SUFFIX));
-    if beside.exists() { Ok(beside) } else { Err("the tool is not built: use cargo rig trials".into()) }
+fn fits(runner: &Runner, wanted: &Wanted, count: usize) {
+    let first = wanted.first_round.wrapping_mul(10_000);
+    let seeds: Vec<u64> = (0..count as u64).map(|i| first.wrapping_add(i)).collect();
+    let fit = |seed: &u64| coverage::fit(runner, &wanted.scenario, *seed);
+    print!("{}", coverage::table(&runner.each(&seeds, fit, coverage::Fitted::words)));
 }
 
-fn cases(arguments: &Arguments) -> Result<Vec<(Vec<Effect>, u64)>, String> {
+fn cases(arguments: &Arguments, runner: &Runner, wanted: &Wanted, campaign: &str) -> Result<(), String> {
+    let all = wanted.cases();
+    let mine: Vec<(usize, &Scenario)> = all
+        .iter()
+        .enumerate()
+        .filter(|(place, _)| arguments.case.is_none_or(|shard| shard.has(*place)))
+        .collect();
+    let records = runner.each(
+        &mine,
+        |(place, scenario)| runner.case(campaign, place + 1, all.len(), scenario),
+        |record| {
+            let verdict = if record.right() { "right" } else { "WRONG" };
+            let why = record.failure.as_ref().map_or(String::new(), |why| format!(": {why}"));
+            format!("{verdict} {}: {}{why} ({:.0} s)", record.name(), record.words(), record.wall_s)
+        },
+    );
+    if let Some(path) = &arguments.json_lines {
+        write_lines(path, &records)?;
+    }
+    match arguments.case {
+        // A table of a part would look like one of the whole.
+        Some(_) if arguments.json_lines.is_some() => Ok(()),
+        Some(_) => records.iter().try_for_each(|record| {
+            serde_json::to_string(record).map(|line| println!("{line}")).map_err(|e| e.to_string())
+        }),
+        None => {
+            print!("{}", table::table(&records));
+            Ok(())
+        }
+    }
+}
+
+/// The cases wanted, and the words that say which they are.
+fn campaign(arguments: &Arguments) -> Result<(Wanted, String), String> {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let commit = match &arguments.seeds_from_commit {
+        Some(name) => Some(Commit::of(sources, name, arguments.allow_dirty)?),
+        None => None,
+    };
+    let scenario = Scenario {
+        rate_hz: arguments.rate_hz,
+        noise_factor: arguments.noise,
+        base: arguments.base,
+        form: arguments.form,
+        plan: arguments.plan,
+        duration_s: arguments.duration_s,
+        rig_file_error: arguments.rig_file_error,
+        laws: arguments.laws,
+        imperfection: arguments.imperfections,
+        ..Scenario::new(&[], 0)
+    };
     let all = !arguments.singles
         && arguments.effects.is_empty()
         && arguments.pairs.is_none()
@@ -145,56 +228,49 @@ fn cases(arguments: &Arguments) -> Result<Vec<(Vec<Effect>, u64)>, String> {
     if all || arguments.outside {
         hidden.extend(Effect::outside().into_iter().filter(fits).map(|effect| vec![effect]));
     }
-    let seeds = arguments.first_seed..arguments.first_seed + arguments.seeds;
-    let mut cases: Vec<(Vec<Effect>, u64)> = Vec::new();
-    for seed in seeds {
-        cases.extend(hidden.iter().map(|effects| (effects.clone(), seed)));
-        for i in 0..arguments.pairs.unwrap_or(if all { 10 } else { 0 }) {
-            let pair = Effect::random_pair(1000 * seed + i);
-            if pair.iter().all(fits) {
-                cases.push((pair.to_vec(), 1000 * seed + i));
-            }
-        }
-        for i in 0..arguments.none.unwrap_or(u64::from(all)) {
-            cases.push((Vec::new(), 1000 * i + seed));
-        }
-    }
-    Ok(cases)
+    let wanted = Wanted {
+        rounds: arguments.rounds,
+        first_round: commit.as_ref().map_or(arguments.first_round, Commit::first_round),
+        hidden,
+        pairs: arguments.pairs.unwrap_or(if all { 10 } else { 0 }),
+        clean: arguments.none.unwrap_or(if all { 5 } else { 0 }),
+        exact_seed: arguments.exact_seed,
+        scenario,
+    };
+    let seeds = match &commit {
+        Some(commit) => format!("seeds from {}", commit.words()),
+        None => format!("rounds {} to {}", wanted.first_round, wanted.first_round + wanted.rounds.max(1) - 1),
+    };
+    let Scenario { laws, form, base, plan, imperfection, .. } = &wanted.scenario;
+    let campaign = format!(
+        "laws {laws:?}, {form:?} logs, base {base:?}, plan {plan:?} {} s, {} Hz, noise × {}, imperfections {imperfection:?}, \
+         rig file ± {} %, {seeds}",
+        arguments.duration_s,
+        arguments.rate_hz,
+        arguments.noise,
+        100.0 * arguments.rig_file_error
+    );
+    Ok((wanted, campaign))
 }
 
-fn trial(
-    arguments: &Arguments,
-    rig: &Path,
-    effects: &[Effect],
-    seed: u64,
-    folder: &Path,
-) -> Result<Answer, String> {
-    let scenario = Scenario {
-        rate_hz: arguments.rate_hz,
-        noise_factor: arguments.noise,
-        base: arguments.base,
-        form: arguments.form,
-        ..Scenario::new(effects, seed)
-    };
-    let case = generate(&scenario).map_err(|e| e.to_string())?;
-    let failed = |e: std::io::Error| format!("{}: {e}", folder.display());
-    let paths = case.write(folder).map_err(failed)?;
-    if arguments.keep.is_some() {
-        let truth = case.truth.to_json().map_err(|e| e.to_string())?;
-        std::fs::write(folder.join("truth.json"), truth).map_err(failed)?;
+fn write_lines(path: &Path, records: &[Record]) -> Result<(), String> {
+    let failed = |e: std::io::Error| format!("{}: {e}", path.display());
+    let mut file = std::fs::File::create(path).map_err(failed)?;
+    for record in records {
+        let line = serde_json::to_string(record).map_err(|e| e.to_string())?;
+        writeln!(file, "{line}").map_err(failed)?;
     }
-    let out = folder.join("out");
-    let mut command = Command::new(rig);
-    command.arg("diagnose").arg("--train").args(&paths.train).arg("--holdout").arg(&paths.holdout);
-    command.arg("--out").arg(&out);
-    // A drive's rig file is not needed; the linear stage has none.
-    if let (Some(rig), Some(model)) = (&paths.rig, &paths.model) {
-        command.arg("--rig").arg(rig).arg("--model").arg(model);
+    Ok(())
+}
+
+fn read_lines(paths: &[PathBuf]) -> Result<Vec<Record>, String> {
+    let mut records = Vec::new();
+    for path in paths {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        for (i, line) in text.lines().enumerate() {
+            let record = serde_json::from_str(line);
+            records.push(record.map_err(|e| format!("{} line {}: {e}", path.display(), i + 1))?);
+        }
     }
-    let run = command.stdout(Stdio::null()).output().map_err(|e| format!("{}: {e}", rig.display()))?;
-    if !run.status.success() {
-        return Err(String::from_utf8_lossy(&run.stderr).trim().to_string());
-    }
-    let text = std::fs::read_to_string(out.join("diagnosis.json")).map_err(failed)?;
-    Answer::parse(&text).map_err(|e| e.to_string())
+    Ok(records)
 }

@@ -1,150 +1,193 @@
-//! The hidden effects as laws of their own, one struct each.
+//! The hidden effects as laws of their own: for each effect several from the literature, drawn by the seed.
 //!
-//! Every law is drawn once per case. A law with a memory (heat, wear, age) starts each log fresh; what
-//! differs from log to log for other reasons (phases, event times) is drawn in `begin_log`.
-//! Their form is on purpose not the shortest textbook one: a diagnosis must catch the physics.
+//! A law is drawn once per case, from those of its [`LawFamily`]. A law with a memory (heat, wear, age) starts
+//! each log fresh; what differs from log to log for other reasons (phases, event times) is drawn in
+//! [`Laws::begin_log`]. Amplitudes aim at a relative size between 2 and 15 % of the channel, uniform in the
+//! logarithm ([`family::size`]).
 
-pub mod drive;
-pub mod friction;
+pub mod ageing;
+pub mod bearing;
+pub mod block;
+pub mod clipping;
+pub mod coupling;
+pub mod disc;
+pub mod encoder;
+pub mod family;
+pub mod film;
+pub mod hysteresis;
+pub mod lateness;
+pub mod lever;
+pub mod load;
 pub mod measurement;
 pub mod outside;
-pub mod pressure;
+pub mod ripple;
+pub mod slide;
+pub mod springs;
+pub mod thermal;
+pub mod wear;
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::contact_force::{Branch, Film};
+pub use family::LawFamily;
+pub use slide::Slide;
+
 use crate::curve::{Asymmetry, Bell};
 use crate::effect::Effect;
 use crate::random::Stream;
 use crate::rig::Rig;
 
-/// Laws of a case; `None` where the effect is absent.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct Laws {
-    /// Cubic hardening of the hidden block, per m².
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub element_compliance: Option<f64>,
-    /// See [`friction::ThermalFade`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub thermal_fade: Option<friction::ThermalFade>,
-    /// See [`friction::WearDrift`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wear_drift: Option<friction::WearDrift>,
-    /// See [`friction::DiscAngle`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub disc_angle: Option<friction::DiscAngle>,
-    /// See [`friction::LoadDependence`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub load_dependence: Option<friction::LoadDependence>,
-    /// See [`friction::StaticAgeing`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub static_ageing: Option<friction::StaticAgeing>,
-    /// See [`Asymmetry`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub direction_asymmetry: Option<Asymmetry>,
-    /// See [`Bell`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bell_curve: Option<Bell>,
-    /// Branches of the creeping block; stiffness is a share of the block's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rubber_relaxation: Option<Vec<Branch>>,
-    /// See [`Film`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub viscous_film: Option<Film>,
-    /// See [`measurement::Crosstalk`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bridge_crosstalk: Option<measurement::Crosstalk>,
-    /// See [`measurement::Drift`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bridge_drift: Option<measurement::Drift>,
-    /// Delay of the friction channel, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub friction_delay: Option<f64>,
-    /// See [`measurement::Ring`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ring_resonance: Option<measurement::Ring>,
-    /// See [`measurement::Eccentricity`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub encoder_eccentricity: Option<measurement::Eccentricity>,
-    /// See [`measurement::Saturation`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub adc_saturation: Option<measurement::Saturation>,
-    /// See [`pressure::LeverHysteresis`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lever_hysteresis: Option<pressure::LeverHysteresis>,
-    /// See [`pressure::FoilHardening`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub foil_hardening: Option<pressure::FoilHardening>,
-    /// See [`pressure::M1Ripple`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub m1_ripple: Option<pressure::M1Ripple>,
-    /// See [`drive::Coupling`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shaft_torsion: Option<drive::Coupling>,
-    /// See [`drive::Coupling`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub backlash: Option<drive::Coupling>,
-    /// See [`drive::Ripple`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub m2_ripple: Option<drive::Ripple>,
-    /// See [`drive::Uneven`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bearing_asymmetry: Option<drive::Uneven>,
-    /// Torque nobody commanded.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_offset: Option<f64>,
-    /// See [`drive::Falling`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bearing_stribeck: Option<drive::Falling>,
-    /// See [`drive::Yielding`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub presliding: Option<drive::Yielding>,
-    /// Delay between torque and shaft, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub drive_delay: Option<f64>,
-    /// See [`outside::Hum`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mains_hum: Option<outside::Hum>,
-    /// See [`outside::Telegraph`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mu_telegraph: Option<outside::Telegraph>,
-    /// See [`outside::Breathing`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mu_breathing: Option<outside::Breathing>,
-    /// See [`outside::Shaken`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shaken_contact: Option<outside::Shaken>,
-    /// See [`outside::Memory`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reversal_memory: Option<outside::Memory>,
-    /// Gain error of M1's torque monitor per |speed of M2|.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub monitor_speed_gain: Option<f64>,
-    /// See [`outside::Wobble`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub disc_wobble: Option<outside::Wobble>,
-    /// See [`outside::Creep`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bridge_creep: Option<outside::Creep>,
-    /// Bearing drag per normal force, N·m/N.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub thrust_bearing: Option<f64>,
-    /// Loss of torque constant at the reference speed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_sag: Option<f64>,
+/// Size of the drive's quantities relative to the rotary one: a linear stage moves 10 mm where the
+/// rotary drive turns 1 rad, and pushes 80 N where it turns with 1 N·m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Torque or force per N·m.
+    pub torque: f64,
+    /// Angle or length per rad.
+    pub travel: f64,
 }
 
-/// What sizes an effect: the case's rig, the rate of its log, the loads it is run at.
+impl Units {
+    /// The rotary drive.
+    pub const ROTARY: Self = Self { torque: 1.0, travel: 1.0 };
+    /// The linear stage.
+    pub const LINEAR: Self = Self { torque: 80.0, travel: 0.01 };
+}
+
+/// What the draws may depend on.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting<'a> {
-    /// The true rig.
+    /// True rig.
     pub rig: &'a Rig,
     /// Rate of the log.
     pub rate_hz: f64,
-    /// Greatest normal force of the runs.
+    /// Length of a log.
+    pub duration_s: f64,
+    /// Greatest static normal force of the courses; 0 where there is no contact.
     pub greatest_normal_n: f64,
     /// Units of the drive.
-    pub units: drive::Units,
+    pub units: Units,
+    /// Laws to draw from.
+    pub family: LawFamily,
+}
+
+/// Distance that a course slides per time.
+const SLID_M_PER_S: f64 = 0.3;
+/// Factor on the Coulomb drag of a bearing that yields before it slides: with the drag of a plain bearing
+/// it would hardly show beside the contact.
+const STRONGER: (f64, f64) = (1.5, 2.6);
+
+/// A bearing that gives before it slides; see [`hysteresis`] for its laws.
+#[derive(Debug, Clone, Serialize)]
+pub struct Yielding {
+    /// Share of the drag over travel.
+    #[serde(flatten)]
+    pub hysteresis: hysteresis::Hysteresis,
+    /// Factor on the Coulomb drag of the rig.
+    pub stronger: f64,
+}
+
+impl Yielding {
+    /// Draws one that yields over 0.04 to 0.12 rad.
+    pub fn draw(s: &mut Stream, family: LawFamily, units: Units) -> Self {
+        let reach = s.log_uniform(0.04, 0.12) * units.travel;
+        let stronger = s.uniform(STRONGER.0, STRONGER.1);
+        Self { hysteresis: hysteresis::Hysteresis::draw(s, family, reach), stronger }
+    }
+}
+
+macro_rules! laws {
+    ($($(#[$doc:meta])* $field:ident: $law:ty,)*) => {
+        /// Laws of a case; `None` where the effect is absent.
+        #[derive(Debug, Clone, Default, Serialize)]
+        pub struct Laws {
+            $($(#[$doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$law>,)*
+        }
+    };
+}
+
+laws! {
+    /// Spring of the hidden block.
+    element_compliance: block::Spring,
+    /// See [`thermal`].
+    thermal_fade: thermal::ThermalFade,
+    /// See [`wear`].
+    wear_drift: wear::WearDrift,
+    /// See [`disc`].
+    disc_angle: disc::DiscAngle,
+    /// See [`load`].
+    load_dependence: load::LoadDependence,
+    /// See [`ageing`].
+    static_ageing: ageing::StaticAgeing,
+    /// See [`crate::curve`].
+    direction_asymmetry: Asymmetry,
+    /// See [`crate::curve`].
+    bell_curve: Bell,
+    /// See [`block`].
+    rubber_relaxation: block::Relaxation,
+    /// See [`film`].
+    viscous_film: film::Film,
+    /// See [`measurement`].
+    bridge_crosstalk: measurement::Crosstalk,
+    /// See [`measurement`].
+    bridge_drift: measurement::Drift,
+    /// See [`lateness`].
+    friction_delay: lateness::Lateness,
+    /// See [`measurement`].
+    ring_resonance: measurement::Ring,
+    /// See [`encoder`].
+    encoder_eccentricity: encoder::Eccentricity,
+    /// See [`clipping`].
+    adc_saturation: clipping::Saturation,
+    /// See [`lever`].
+    lever_hysteresis: lever::LeverHysteresis,
+    /// See [`springs`].
+    foil_hardening: springs::FoilHardening,
+    /// See [`lever`].
+    m1_ripple: ripple::Ripple,
+    /// See [`coupling`].
+    shaft_torsion: coupling::Coupling,
+    /// See [`coupling`].
+    backlash: coupling::Coupling,
+    /// See [`ripple`].
+    m2_ripple: ripple::Ripple,
+    /// See [`bearing`].
+    bearing_asymmetry: bearing::Uneven,
+    /// See [`bearing`].
+    torque_offset: bearing::Offset,
+    /// See [`bearing`].
+    bearing_stribeck: bearing::Falling,
+    /// See [`Yielding`].
+    presliding: Yielding,
+    /// See [`lateness`].
+    drive_delay: lateness::Lateness,
+    /// See [`outside::Hum`].
+    mains_hum: outside::Hum,
+    /// See [`outside::Telegraph`].
+    mu_telegraph: outside::Telegraph,
+    /// See [`outside::Breathing`].
+    mu_breathing: outside::Breathing,
+    /// See [`outside::Shaken`].
+    shaken_contact: outside::Shaken,
+    /// See [`outside::Memory`].
+    reversal_memory: outside::Memory,
+    /// Relative error of M1's torque monitor per speed of M2.
+    monitor_speed_gain: f64,
+    /// See [`outside::Wobble`].
+    disc_wobble: outside::Wobble,
+    /// See [`outside::Creep`].
+    bridge_creep: outside::Creep,
+    /// Extra Coulomb drag of the bearing per normal force.
+    thrust_bearing: f64,
+    /// Loss of torque constant at the reference speed.
+    torque_sag: f64,
+    /// See [`outside::Wander`].
+    mu_wander: outside::Wander,
+    /// See [`outside::LoosePlug`].
+    loose_plug: outside::LoosePlug,
+    /// See [`outside::LoadMemory`].
+    load_memory: outside::LoadMemory,
 }
 
 impl Laws {
@@ -159,47 +202,56 @@ impl Laws {
     }
 
     fn add(&mut self, effect: Effect, s: &mut Stream, setting: &Setting<'_>) {
-        let units = setting.units;
+        let (family, units) = (setting.family, setting.units);
         match effect {
-            Effect::ElementCompliance => self.element_compliance = Some(s.uniform(3e3, 1e4)),
-            Effect::ThermalFade => self.thermal_fade = Some(friction::ThermalFade::draw(s)),
-            Effect::WearDrift => self.wear_drift = Some(friction::WearDrift::draw(s)),
-            Effect::DiscAngle => self.disc_angle = Some(friction::DiscAngle::draw(s)),
-            Effect::LoadDependence => self.load_dependence = Some(friction::LoadDependence::draw(s)),
-            Effect::StaticAgeing => self.static_ageing = Some(friction::StaticAgeing::draw(s)),
-            Effect::DirectionAsymmetry => self.direction_asymmetry = Some(Asymmetry::draw(s)),
-            Effect::BellCurve => self.bell_curve = Some(Bell::draw(s)),
-            Effect::RubberRelaxation => self.rubber_relaxation = Some(friction::relaxation_branches(s)),
-            Effect::ViscousFilm => {
-                self.viscous_film =
-                    Some(Film { drag_n_s_per_m: s.uniform(9.0, 22.0), knee_m_s: s.uniform(1.5, 3.0) });
+            Effect::ElementCompliance => self.element_compliance = Some(block::Spring::draw(s, family)),
+            Effect::ThermalFade => self.thermal_fade = Some(thermal::ThermalFade::draw(s, family)),
+            Effect::WearDrift => {
+                let distance_m = SLID_M_PER_S * setting.duration_s;
+                self.wear_drift = Some(wear::WearDrift::draw(s, family, distance_m));
             }
-            Effect::BridgeCrosstalk => self.bridge_crosstalk = Some(measurement::Crosstalk::draw(s)),
-            Effect::BridgeDrift => self.bridge_drift = Some(measurement::Drift::draw(s)),
-            Effect::FrictionDelay => self.friction_delay = Some(s.uniform(3e-3, 12e-3)),
-            Effect::RingResonance => {
-                self.ring_resonance = Some(measurement::Ring::draw(s, setting.rate_hz));
+            Effect::DiscAngle => self.disc_angle = Some(disc::DiscAngle::draw(s, family)),
+            Effect::LoadDependence => self.load_dependence = Some(load::LoadDependence::draw(s, family)),
+            Effect::StaticAgeing => self.static_ageing = Some(ageing::StaticAgeing::draw(s, family)),
+            Effect::DirectionAsymmetry => self.direction_asymmetry = Some(Asymmetry::draw(s, family)),
+            Effect::BellCurve => self.bell_curve = Some(Bell::draw(s, family)),
+            Effect::RubberRelaxation => self.rubber_relaxation = Some(block::Relaxation::draw(s, family)),
+            Effect::ViscousFilm => self.viscous_film = Some(film::Film::draw(s, family)),
+            Effect::BridgeCrosstalk => self.bridge_crosstalk = Some(measurement::Crosstalk::draw(s, family)),
+            Effect::BridgeDrift => self.bridge_drift = Some(measurement::Drift::draw(s, family, setting)),
+            Effect::FrictionDelay => {
+                self.friction_delay = Some(lateness::Lateness::draw(s, family, 2e-3, 12e-3));
             }
+            Effect::RingResonance => self.ring_resonance = Some(measurement::Ring::draw(s, setting)),
             Effect::EncoderEccentricity => {
-                self.encoder_eccentricity = Some(measurement::Eccentricity::draw(s));
+                self.encoder_eccentricity = Some(encoder::Eccentricity::draw(s, family));
             }
-            Effect::AdcSaturation => self.adc_saturation = Some(measurement::Saturation::draw(s)),
-            Effect::LeverHysteresis => self.lever_hysteresis = Some(pressure::LeverHysteresis::draw(s)),
+            Effect::AdcSaturation => self.adc_saturation = Some(clipping::Saturation::draw(s, family)),
+            Effect::LeverHysteresis => self.lever_hysteresis = Some(lever::LeverHysteresis::draw(s, setting)),
             Effect::FoilHardening => {
-                self.foil_hardening = Some(pressure::FoilHardening::draw(s, setting.greatest_normal_n));
+                let greatest_n = setting.greatest_normal_n;
+                self.foil_hardening = Some(springs::FoilHardening::draw(s, family, greatest_n));
             }
-            Effect::M1Ripple => {
-                let travel = setting.greatest_normal_n / setting.rig.mechanism_n_per_rad;
-                self.m1_ripple = Some(pressure::M1Ripple::draw(s, travel, setting.rig));
+            Effect::M1Ripple => self.m1_ripple = Some(lever::m1_ripple(s, setting)),
+            Effect::ShaftTorsion => self.shaft_torsion = Some(coupling::Coupling::torsion(s, setting)),
+            Effect::Backlash => self.backlash = Some(coupling::Coupling::backlash(s, setting)),
+            Effect::M2Ripple => {
+                let orders = [4.0, 6.0, 8.0, 9.0, 10.0, 12.0, 14.0, 18.0, 24.0];
+                let rms = s.log_uniform(0.06, 0.25) * units.torque;
+                let per_travel = orders.map(|order| order / units.travel);
+                self.m2_ripple = Some(ripple::Ripple::draw(s, family, &per_travel, rms));
             }
-            Effect::ShaftTorsion => self.shaft_torsion = Some(drive::Coupling::torsion(s, setting)),
-            Effect::Backlash => self.backlash = Some(drive::Coupling::backlash(s, setting)),
-            Effect::M2Ripple => self.m2_ripple = Some(drive::Ripple::draw(s, units)),
-            Effect::BearingAsymmetry => self.bearing_asymmetry = Some(drive::Uneven::draw(s, units)),
-            Effect::TorqueOffset => self.torque_offset = Some(s.signed(0.1, 0.3) * units.torque),
-            Effect::BearingStribeck => self.bearing_stribeck = Some(drive::Falling::draw(s, units)),
-            Effect::Presliding => self.presliding = Some(drive::Yielding::draw(s, units)),
-            Effect::DriveDelay => self.drive_delay = Some(s.uniform(3e-3, 9e-3)),
+            Effect::BearingAsymmetry => {
+                self.bearing_asymmetry = Some(bearing::Uneven::draw(s, family, units));
+            }
+            Effect::TorqueOffset => self.torque_offset = Some(bearing::Offset::draw(s, family, units)),
+            Effect::BearingStribeck => {
+                self.bearing_stribeck = Some(bearing::Falling::draw(s, family, units));
+            }
+            Effect::Presliding => self.presliding = Some(Yielding::draw(s, family, units)),
+            Effect::DriveDelay => {
+                self.drive_delay = Some(lateness::Lateness::draw(s, family, 2.5e-3, 9e-3));
+            }
             Effect::MainsHum => self.mains_hum = Some(outside::Hum::draw(s)),
             Effect::MuTelegraph => self.mu_telegraph = Some(outside::Telegraph::draw(s)),
             Effect::MuBreathing => self.mu_breathing = Some(outside::Breathing::draw(s)),
@@ -210,52 +262,60 @@ impl Laws {
             Effect::BridgeCreep => self.bridge_creep = Some(outside::Creep::draw(s)),
             Effect::ThrustBearing => self.thrust_bearing = Some(s.uniform(0.003, 0.007)),
             Effect::TorqueSag => self.torque_sag = Some(s.uniform(0.15, 0.3)),
+            Effect::MuWander => self.mu_wander = Some(outside::Wander::draw(s)),
+            Effect::LoosePlug => self.loose_plug = Some(outside::LoosePlug::draw(s)),
+            Effect::LoadMemory => self.load_memory = Some(outside::LoadMemory::draw(s)),
         }
     }
 
     /// Draws what differs from log to log.
     pub fn begin_log(&mut self, s: &mut Stream, duration_s: f64) {
-        if let Some(hum) = &mut self.mains_hum {
-            hum.begin_log(s);
+        if let Some(law) = &mut self.mains_hum {
+            law.begin_log(s);
         }
-        if let Some(telegraph) = &mut self.mu_telegraph {
-            telegraph.begin_log(s, duration_s);
+        if let Some(law) = &mut self.mu_telegraph {
+            law.begin_log(s, duration_s);
         }
-        if let Some(breathing) = &mut self.mu_breathing {
-            breathing.begin_log(s);
+        if let Some(law) = &mut self.mu_breathing {
+            law.begin_log(s);
+        }
+        if let Some(law) = &mut self.mu_wander {
+            law.begin_log(s, duration_s);
+        }
+        if let Some(law) = &mut self.loose_plug {
+            law.begin_log(s, duration_s);
+        }
+        if let Some(law) = &mut self.torque_offset {
+            law.begin_log(s);
         }
     }
 
     /// Factor of all the laws that act on µ as a whole; advances their memories by a step.
-    pub fn mu_factor(&mut self, slide: &friction::Slide) -> f64 {
+    pub fn mu_factor(&mut self, slide: &Slide) -> f64 {
         let mut factor = 1.0;
-        if let Some(law) = &mut self.thermal_fade {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &mut self.wear_drift {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &self.disc_angle {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &self.load_dependence {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &mut self.static_ageing {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &self.mu_telegraph {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &self.mu_breathing {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &mut self.shaken_contact {
-            factor *= law.factor(slide);
-        }
-        if let Some(law) = &mut self.reversal_memory {
-            factor *= law.factor(slide);
-        }
+        let mut with = |of: Option<f64>| factor *= of.unwrap_or(1.0);
+        with(self.thermal_fade.as_mut().map(|law| law.factor(slide)));
+        with(self.wear_drift.as_mut().map(|law| law.factor(slide)));
+        with(self.disc_angle.as_ref().map(|law| law.factor(slide)));
+        with(self.load_dependence.as_ref().map(|law| law.factor(slide)));
+        with(self.static_ageing.as_mut().map(|law| law.factor(slide)));
+        with(self.mu_telegraph.as_ref().map(|law| law.factor(slide)));
+        with(self.mu_breathing.as_ref().map(|law| law.factor(slide)));
+        with(self.shaken_contact.as_mut().map(|law| law.factor(slide)));
+        with(self.reversal_memory.as_mut().map(|law| law.factor(slide)));
+        with(self.mu_wander.as_ref().map(|law| law.factor(slide)));
+        with(self.load_memory.as_mut().map(|law| law.factor(slide)));
         factor
+    }
+
+    /// Name of the law drawn for each effect that has several.
+    #[must_use]
+    pub fn names(&self) -> BTreeMap<String, String> {
+        let Ok(serde_json::Value::Object(all)) = serde_json::to_value(self) else { return BTreeMap::new() };
+        let name = |law: &serde_json::Value| {
+            let of = |key: &str| law.get(key).and_then(|name| name.as_str()).filter(|name| *name != "none");
+            of("play_law").or(of("law")).map(str::to_owned)
+        };
+        all.into_iter().filter_map(|(effect, law)| Some((effect, name(&law)?))).collect()
     }
 }

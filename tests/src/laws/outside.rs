@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::laws::friction::Slide;
+use crate::laws::slide::Slide;
 use crate::random::Stream;
 
 /// 50 Hz and its third harmonic in the friction channel.
@@ -206,5 +206,107 @@ impl Creep {
     pub fn read(&mut self, normal_n: f64, step_s: f64) -> f64 {
         self.late_n += step_s / self.time_s * (normal_n - self.late_n);
         normal_n + self.share * (self.late_n - normal_n)
+    }
+}
+
+/// µ wanders: e^(w), w an Ornstein–Uhlenbeck process (G. E. Uhlenbeck, L. S. Ornstein, Phys. Rev. 36, 1930; random
+/// friction in R. A. Ibrahim, Appl. Mech. Rev. 47, 1994), another in each log.
+#[derive(Debug, Clone, Serialize)]
+pub struct Wander {
+    share: f64,
+    memory_s: f64,
+    #[serde(skip)]
+    path: Vec<f64>,
+}
+
+/// Step of the wandering.
+const WANDER_STEP_S: f64 = 0.02;
+
+impl Wander {
+    /// Draws one.
+    pub fn draw(s: &mut Stream) -> Self {
+        Self { share: s.uniform(0.07, 0.13), memory_s: s.uniform(0.5, 1.5), path: Vec::new() }
+    }
+
+    pub(crate) fn begin_log(&mut self, s: &mut Stream, duration_s: f64) {
+        let keep = (-WANDER_STEP_S / self.memory_s).exp();
+        let kick = self.share * (1.0 - keep * keep).sqrt();
+        let mut value = self.share * s.normal();
+        self.path = (0..=(duration_s / WANDER_STEP_S) as usize + 1)
+            .map(|_| {
+                value = keep * value + kick * s.normal();
+                value
+            })
+            .collect();
+    }
+
+    /// Factor on µ.
+    #[must_use]
+    pub fn factor(&self, slide: &Slide) -> f64 {
+        let at = slide.time_s / WANDER_STEP_S;
+        let from = at as usize;
+        let value = |i: usize| self.path.get(i).copied().unwrap_or(0.0);
+        (value(from) + (value(from + 1) - value(from)) * at.fract()).exp()
+    }
+}
+
+/// A plug of the friction bridge that loses part of the signal for tenths of a second, at random times, others
+/// in each log.
+#[derive(Debug, Clone, Serialize)]
+pub struct LoosePlug {
+    lost_share: f64,
+    mean_pause_s: f64,
+    #[serde(skip)]
+    spells: Vec<(f64, f64)>,
+}
+
+impl LoosePlug {
+    /// Draws one.
+    pub fn draw(s: &mut Stream) -> Self {
+        Self { lost_share: s.uniform(0.2, 0.4), mean_pause_s: s.uniform(0.8, 1.6), spells: Vec::new() }
+    }
+
+    pub(crate) fn begin_log(&mut self, s: &mut Stream, duration_s: f64) {
+        self.spells.clear();
+        let mut time = s.uniform(0.0, self.mean_pause_s);
+        while time < duration_s {
+            let length = s.uniform(0.1, 0.35);
+            self.spells.push((time, time + length));
+            time += length - self.mean_pause_s * (1.0 - s.uniform(0.0, 1.0)).ln();
+        }
+    }
+
+    /// Factor on what the bridge reads.
+    #[must_use]
+    pub fn factor(&self, time_s: f64) -> f64 {
+        let next = self.spells.partition_point(|(start, _)| *start <= time_s);
+        let inside = next > 0 && time_s < self.spells[next - 1].1;
+        if inside { 1.0 - self.lost_share } else { 1.0 }
+    }
+}
+
+/// Friction follows a change of the normal force only after some sliding: the share of the load that counts is
+/// renewed over a distance (V. Prakash, J. Tribology 120, 1998: no jump of friction at a jump of load).
+#[derive(Debug, Clone, Serialize)]
+pub struct LoadMemory {
+    distance_m: f64,
+    share: f64,
+    #[serde(skip)]
+    remembered_n: Option<f64>,
+}
+
+impl LoadMemory {
+    /// Draws one.
+    pub fn draw(s: &mut Stream) -> Self {
+        Self { distance_m: s.uniform(0.04, 0.12), share: s.uniform(0.5, 0.9), remembered_n: None }
+    }
+
+    /// Factor on µ.
+    pub fn factor(&mut self, slide: &Slide) -> f64 {
+        let remembered = self.remembered_n.get_or_insert(slide.normal_n);
+        let renewed = 1.0 - (-slide.step_s * slide.tip_speed_m_s.abs() / self.distance_m).exp();
+        *remembered += renewed * (slide.normal_n - *remembered);
+        let felt = slide.normal_n + self.share * (*remembered - slide.normal_n);
+        (felt / slide.normal_n.max(1.0)).clamp(0.3, 3.0)
     }
 }
