@@ -92,7 +92,7 @@ impl<T: Real> Element<T> for Dahl<T> {
         let reach_m = limit_n / self.sigma0;
         let q = T::ONE - state.deflection_m * v.sign() / reach_m;
         let gone = self.change(q, self.step_s * v.abs() / reach_m);
-        state.deflection_m = state.deflection_m - gone * reach_m * v.sign();
+        state.deflection_m -= gone * reach_m * v.sign();
         FrictionForce { force_n: self.sigma0 * state.deflection_m, tip_speed_m_s: v }
     }
 

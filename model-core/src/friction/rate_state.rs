@@ -161,7 +161,7 @@ impl<T: Real, L: Law> RateState<T, L> {
             let (value, slope) = Self::asinh_exp(y + strength);
             let damping_n = impedance * twice * y.exp();
             let move_by = (direct_n * value + damping_n - drive_n) / (direct_n * slope + damping_n);
-            y = y - move_by;
+            y -= move_by;
             if move_by.abs() <= T::from_f64(4.0) * T::EPSILON * y.abs().at_least(T::ONE) {
                 break;
             }
@@ -193,7 +193,7 @@ impl<T: Real, L: Law> RateState<T, L> {
         } else {
             let mut psi = state.psi;
             if state.load_n > T::ZERO {
-                psi = psi - self.load_memory_per_b * (load_n / state.load_n).ln();
+                psi -= self.load_memory_per_b * (load_n / state.load_n).ln();
             }
             // ψ at the end for the speed before; then again for the mean of both speeds.
             let guess = self.evolved(psi, before, self.step_s);
