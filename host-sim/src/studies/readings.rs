@@ -104,8 +104,9 @@ impl Case {
     fn seen(&self, reading: Reading) -> Seen {
         let v = self.speed_m_s;
         let steady = self.g(reading, v);
-        // Forty times the way on which LuGre's bristles wind up.
-        let duration_s = 40.0 * steady / self.stiffness_per_load / v;
+        // Forty times the way on which LuGre's bristles wind up, and the lag's own time to settle.
+        let lag_s = if let Reading::Lag(time_s) = reading { time_s } else { 0.0 };
+        let duration_s = 40.0 * (steady / self.stiffness_per_load / v + lag_s);
         let step_s = match reading {
             Reading::PreviousStep(step_s) => step_s,
             _ => steady / self.stiffness_per_load / v / STEPS_OF_WIND_UP,

@@ -67,6 +67,9 @@ impl Tournament {
     }
 }
 
+/// Residual that stands for a refusal, in parts of a log's RMS: far worse than any prediction.
+const REFUSED: f64 = 1.0;
+
 /// Forces on each course.
 type Forces = Vec<Vec<f64>>;
 
@@ -157,7 +160,10 @@ fn one(
     let scales: Vec<f64> =
         train.iter().map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9)).collect();
     let residuals = |p: &FrictionParameters<f64>| {
-        let predicted = forces(p, &plan.train)?;
+        // Numbers that the model refuses (several roots of the modified LuGre model) are no end of the search.
+        let Some(predicted) = forces(p, &plan.train) else {
+            return Some(vec![REFUSED; train.iter().map(Vec::len).sum()]);
+        };
         let each = train.iter().zip(&predicted).zip(&scales);
         Some(
             each.flat_map(|((a, b), scale)| a.iter().zip(b).map(move |(a, b)| (b - a) / scale))
