@@ -75,7 +75,13 @@ fn nrmse(kind: ModelKind, experiment: &str) -> f64 {
 
 #[test]
 fn every_model_in_f32_is_within_a_thousandth_of_f64_on_its_own_motion() {
-    for &kind in ModelKind::ALL {
+    // A trace of stick-slip can be compared with none: blocks with less damping than the falling curve takes at 10 rpm
+    // are compared in `model-core/tests/rivals.rs`.
+    let damped = |kind: &ModelKind| {
+        let damping = FrictionParameters::<f64>::typical(*kind).get("c_u_n_s_per_m");
+        damping.is_none_or(|c_u| c_u > 100.0)
+    };
+    for &kind in ModelKind::ALL.iter().filter(|kind| damped(kind)) {
         for experiment in ["fig18", "fig19", "fig20", "fig21"] {
             let found = nrmse(kind, experiment);
             let kind = kind.name();
