@@ -12,6 +12,7 @@ pub mod link;
 pub mod lockstep;
 pub mod plant;
 pub mod predict;
+pub mod provenance;
 pub mod report;
 pub mod studies;
 pub mod summary;
