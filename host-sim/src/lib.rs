@@ -10,6 +10,7 @@ pub mod fit;
 pub mod input_error;
 pub mod link;
 pub mod lockstep;
+pub mod notices;
 pub mod plant;
 pub mod predict;
 pub mod provenance;

@@ -3,14 +3,18 @@
 pub mod effect_id;
 mod experiment_core;
 pub mod experiment_file;
+pub mod import;
+pub mod journal;
 pub mod log;
 mod log_check;
 mod log_csv;
+mod log_mcap;
 mod log_parquet;
 pub mod model_file;
 pub mod number;
 pub mod output_dir;
 pub mod overrides;
+pub mod plausible;
 pub mod rig_file;
 pub mod signal;
 pub mod toml_tree;
