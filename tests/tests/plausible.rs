@@ -20,14 +20,14 @@ fn no_effect_looks_like_a_wrong_unit() {
     let cases: Vec<&[Effect]> = std::iter::once(&[][..]).chain(Effect::ALL.chunks(1)).collect();
     for effects in cases {
         let name = effects.first().map_or("nothing hidden", |effect| effect.id());
-        raises_no_doubt(name, &Scenario { duration_s: 12.0, ..Scenario::new(effects, 7) });
+        raises_no_doubt(name, &Scenario { duration_s: 6.0, ..Scenario::new(effects, 7) });
     }
 }
 
 #[test]
 fn no_rate_noise_or_form_looks_like_a_wrong_unit() {
     for rate_hz in [200.0, 20_000.0] {
-        let scenario = Scenario { rate_hz, duration_s: 6.0, ..Scenario::new(&[], 3) };
+        let scenario = Scenario { rate_hz, duration_s: 4.0, ..Scenario::new(&[], 3) };
         raises_no_doubt(&format!("{rate_hz} Hz"), &scenario);
     }
     raises_no_doubt("noise", &Scenario { noise_factor: 3.0, ..Scenario::new(&[], 4) });
