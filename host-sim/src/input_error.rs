@@ -1,12 +1,54 @@
-//! What is wrong with something the user gave: one line, exit status 2.
+//! Why a command could not do what it was asked: one line, and an exit status by its kind.
 //!
 //! The line reads `FILE:LINE: KEY = VALUE: what is wrong; allowed: …`, each part only where it is known.
-//! It is the only error type of the tool: whatever a command refuses, it refuses with one of these.
+//! It is the only error type of the tool: whatever a command refuses, it refuses with one of these. Most often
+//! something the user gave is wrong; [`Kind`] tells the other cases apart.
 
 use std::fmt;
 use std::path::Path;
 
 use model_core::error::ParameterError;
+
+/// What kind of thing went wrong; scripts see it as the exit status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kind {
+    /// Something the user gave is wrong.
+    #[default]
+    Input,
+    /// The rig refused, or the run ended before its time: a fault, a stop by the user.
+    Run,
+    /// The rig does not answer any more, or its port is gone.
+    Rig,
+    /// The results cannot be stored: no space left.
+    Storage,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 4] = [Self::Input, Self::Run, Self::Rig, Self::Storage];
+
+    /// The exit status.
+    #[must_use]
+    pub const fn exit_status(self) -> u8 {
+        match self {
+            Self::Input => 2,
+            Self::Run => 3,
+            Self::Rig => 4,
+            Self::Storage => 5,
+        }
+    }
+
+    /// The kind in words, for `--json` and the help.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Input => "bad input",
+            Self::Run => "the run failed or ended before its time",
+            Self::Rig => "the rig is lost or does not answer",
+            Self::Storage => "the results cannot be stored: no space left",
+        }
+    }
+}
 
 /// One refused input: where it stands, what it was, what is wrong, what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,6 +66,7 @@ struct Parts {
     value: Option<String>,
     problem: String,
     allowed: Option<String>,
+    kind: Kind,
 }
 
 impl InputError {
@@ -72,10 +115,26 @@ impl InputError {
         self
     }
 
+    /// Says what kind of error it is; without this, bad input.
+    #[must_use]
+    pub fn of_kind(mut self, kind: Kind) -> Self {
+        self.0.kind = kind;
+        self
+    }
+
+    /// What kind of error it is.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.0.kind
+    }
+
     /// Says that reading or writing a path failed, and why.
     #[must_use]
     pub fn io(path: &Path, doing: &str, error: &std::io::Error) -> Self {
-        Self::in_file(path, format!("cannot {doing}: {}", io_reason(error)))
+        use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        let full = matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge);
+        let kind = if full { Kind::Storage } else { Kind::Input };
+        Self::in_file(path, format!("cannot {doing}: {}", io_reason(error))).of_kind(kind)
     }
 }
 
@@ -139,6 +198,15 @@ mod tests {
             .value(-1.0)
             .allowed("> 0");
         assert_eq!(error.to_string(), "rig.toml:7: pressure.mode_hz = -1: out of range; allowed: > 0");
+    }
+
+    #[test]
+    fn a_full_disk_and_a_missing_file_have_exit_statuses_of_their_own() {
+        let status = |kind: std::io::ErrorKind| {
+            InputError::io(Path::new("x"), "write", &kind.into()).kind().exit_status()
+        };
+        assert_eq!((status(std::io::ErrorKind::StorageFull), status(std::io::ErrorKind::NotFound)), (5, 2));
+        assert_eq!(Kind::ALL.map(Kind::exit_status), [2, 3, 4, 5]);
     }
 
     #[test]

@@ -4,67 +4,11 @@
 
 mod fake_rig;
 
-use std::os::fd::AsRawFd;
 use std::path::PathBuf;
-use std::process::{Command, Output};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
-use std::time::Duration;
 
-use fake_rig::{Rig, setup};
+use fake_rig::bench::Bench;
 use host_sim::files::log::Log;
 use host_sim::files::signal::Signal;
-use serial2::SerialPort;
-
-/// A rig behind a port of its own, as long as this lives.
-struct Bench {
-    port: String,
-    /// Keeps the terminal there between two commands.
-    _end: SerialPort,
-    rig: Arc<Mutex<Rig>>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let (_, setup) = setup("fig20");
-        let mut rig = Rig::new(&setup);
-        rig.willing = true;
-        let rig = Arc::new(Mutex::new(rig));
-        let (mut rig_end, tool_end) = SerialPort::pair().unwrap();
-        let link = format!("/proc/self/fd/{}", tool_end.as_raw_fd());
-        let port = std::fs::read_link(link).unwrap().display().to_string();
-        rig_end.set_read_timeout(Duration::from_millis(1)).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let (shared, ends) = (Arc::clone(&rig), Arc::clone(&stop));
-        let thread = std::thread::spawn(move || {
-            let mut buffer = [0; 4096];
-            while !ends.load(Ordering::Relaxed) {
-                let count = rig_end.read(&mut buffer).unwrap_or(0);
-                let out = shared.lock().unwrap().millisecond(&buffer[..count]);
-                rig_end.write_all(&out).unwrap();
-            }
-        });
-        Self { port, _end: tool_end, rig, stop, thread: Some(thread) }
-    }
-
-    fn rig(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_rig"));
-        let (subcommand, rest) = arguments.split_first().unwrap();
-        command.arg(subcommand).arg("--port").arg(&self.port).args(rest).output().unwrap()
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.join().unwrap();
-        }
-    }
-}
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
@@ -102,6 +46,76 @@ fn a_model_file_reaches_the_rig() {
     let output = bench.rig(&["settings", "model", file.to_str().unwrap()]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(bench.rig.lock().unwrap().model, Some(rig_link::model::ModelRecord::default()));
+    // Without a file the model is shown, as the file it could have come from.
+    let shown = text(&bench.rig(&["settings", "model"]).stdout);
+    let again = host_sim::files::model_file::ModelFile::parse("shown", &shown).unwrap();
+    assert_eq!(
+        host_sim::link::model_upload::record(&again).unwrap(),
+        rig_link::model::ModelRecord::default(),
+        "{shown}"
+    );
+    assert!(bench.rig.lock().unwrap().model.is_some(), "showing it does not forget it");
+    assert!(bench.rig(&["settings", "model", "forget"]).status.success());
+    assert_eq!(bench.rig.lock().unwrap().model, None);
+}
+
+#[test]
+fn the_port_may_stand_anywhere_and_erasing_wants_a_yes() {
+    let bench = Bench::new();
+    for arguments in [
+        ["settings", "--port", "PORT", "get", "m1.reversed"],
+        ["settings", "get", "m1.reversed", "--port", "PORT"],
+    ] {
+        let arguments: Vec<&str> = arguments
+            .into_iter()
+            .map(|word| if word == "PORT" { bench.port.as_str() } else { word })
+            .collect();
+        let output = bench.command(&arguments).output().unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(text(&output.stdout).contains("m1.reversed"));
+    }
+    let refused = bench.rig(&["settings", "erase"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("allowed: --yes"), "{}", text(&refused.stderr));
+    assert!(bench.rig(&["settings", "erase", "--yes"]).status.success());
+}
+
+#[test]
+fn a_second_command_on_the_same_port_is_refused_and_names_it() {
+    let bench = Bench::new();
+    let mut first = bench.command(&["monitor", "--plain", "--seconds", "60", "--port", &bench.port]);
+    let mut first =
+        first.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let refused = (0..100)
+        .map(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            bench.rig(&["settings", "get", "m1.reversed"])
+        })
+        .find(|output| !output.status.success());
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let refused = refused.unwrap();
+    assert_eq!(refused.status.code(), Some(4));
+    assert!(
+        text(&refused.stderr).contains("another rig command uses this port"),
+        "{}",
+        text(&refused.stderr)
+    );
+}
+
+#[test]
+fn json_is_one_object_with_what_was_written_and_its_contents() {
+    let bench = Bench::new();
+    let (_parent, out) = folder();
+    let arguments = ["record", "--seconds", "0.1", "--json", "--out", out.to_str().unwrap()];
+    let object: serde_json::Value = serde_json::from_slice(&bench.rig(&arguments).stdout).unwrap();
+    assert_eq!((&object["exit_status"], &object["command"]), (&0.into(), &"record".into()));
+    assert!(object["wrote"][0].as_str().unwrap().ends_with("log.csv"));
+    // The folder holds results now.
+    let object: serde_json::Value = serde_json::from_slice(&bench.rig(&arguments).stdout).unwrap();
+    assert_eq!(object["exit_status"], 2);
+    assert!(object["error"].as_str().unwrap().contains("holds results already"), "{object}");
+    assert!(bench.rig(&[&arguments[..], &["--force"]].concat()).status.success());
 }
 
 #[test]
@@ -144,4 +158,37 @@ fn watching_shows_mode_and_values() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("disabled"), "{}", text(&output.stdout));
     assert!(text(&output.stderr).contains("firmware"));
+}
+
+#[test]
+fn the_screen_shows_the_rig_fits_its_terminal_and_leaves_it_as_it_was() {
+    let bench = Bench::new();
+    let terminal = fake_rig::terminal::Terminal::new(24, 80);
+    let mut command = bench.command(&["monitor", "--port", &bench.port]);
+    let mut child = terminal.spawn(&mut command);
+    let shown = |screen: &vt100::Screen| {
+        let text = screen.contents();
+        let words = [
+            "DISABLED",
+            "normal force",
+            "friction",
+            "speed",
+            "residual",
+            "no fault",
+            "0 rows lost",
+            "q quit",
+        ];
+        words.iter().all(|words| text.contains(words))
+    };
+    let text = terminal.wait_for(shown);
+    assert!(text.lines().count() <= 24 && text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    terminal.resize(40, 120);
+    let text = terminal.wait_for(|screen| screen.contents().lines().count() > 30 && shown(screen));
+    assert!(text.contains("last 10 s"), "{text}");
+    terminal.press(b"-");
+    terminal.wait_for(|screen| screen.contents().contains("last 5 s"));
+    terminal.press(b"q");
+    assert!(child.wait().unwrap().success());
+    terminal.wait_for(|screen| !screen.alternate_screen() && !screen.hide_cursor());
+    assert_eq!(bench.rig.lock().unwrap().every_ticks, 0, "telemetry is switched off again");
 }

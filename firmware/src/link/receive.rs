@@ -18,7 +18,9 @@ pub async fn receive(mut port: Ring, mut operator: Operator) {
             let Some(received) = receiver.push::<Request>(*byte) else { continue };
             match received {
                 Ok(Request { id, command }) => {
-                    tick::link_heard();
+                    if command.is_sign_of_life() {
+                        tick::link_heard();
+                    }
                     let answer = operator.carry_out(command).await;
                     OUTGOING.send(Message::Answer { id, answer }).await;
                 }

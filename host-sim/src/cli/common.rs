@@ -1,13 +1,13 @@
 //! Arguments that several subcommands share.
 
-use std::io::Write;
-
 use crate::files::overrides::Overrides;
 use crate::input_error::InputError;
 
-/// Prints a line on stdout. A reader that has gone away (`rig … | head`) is no error.
+pub use crate::notices::warn;
+
+/// Prints a line on stdout, or keeps it for `--json`.
 pub fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
+    super::session::say(line);
 }
 
 /// What is wrong with the arguments, without usage and hints, in one line.

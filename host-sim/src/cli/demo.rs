@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::common::say;
 use super::progress::Progress;
 use crate::demo::{demo, figure};
 use crate::files::output_dir::OutputDir;
@@ -24,7 +25,7 @@ pub(super) struct Demo {
 impl Demo {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), InputError> {
-        let mut output = OutputDir::new(&self.out)?;
+        let mut output = OutputDir::replacing(&self.out)?;
         let mut progress = None;
         let made = demo(|done, total, what| {
             let bar = progress.get_or_insert_with(|| Progress::new("demo", total as u64));
@@ -36,8 +37,8 @@ impl Demo {
         output.write("overshoot.svg", figure::overshoot_svg(&made.runs)?)?;
         let report = output.folder().join("report.html");
         output.finish()?;
-        print!("{}", made.table);
-        println!("\nreport: {}", report.display());
+        say(made.table.trim_end_matches('\n'));
+        say(&format!("\nreport: {}", report.display()));
         Ok(())
     }
 }

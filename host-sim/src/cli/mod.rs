@@ -4,16 +4,21 @@
 //! and one line in `Command` here.
 
 pub mod common;
+mod convert;
 mod demo;
 mod design;
 mod diagnose;
 mod fit;
+mod interrupt;
+mod keeper;
 mod monitor;
 mod port;
 mod predict;
 mod record;
 mod rivals;
 mod run;
+mod same_logs;
+mod session;
 mod settings;
 mod simulate;
 mod trials;
@@ -25,10 +30,11 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::input_error::InputError;
+use self::session::Shared;
+use crate::input_error::{InputError, Kind};
 
-/// Exit status for bad input.
-const BAD_INPUT: u8 = 2;
+/// Exit status for wrong arguments.
+const BAD_INPUT: u8 = Kind::Input.exit_status();
 
 #[derive(Parser)]
 #[command(
@@ -37,12 +43,14 @@ const BAD_INPUT: u8 = 2;
     about = "Simulate, identify and diagnose the rubber-asphalt friction rig",
     long_about = "Simulate, identify and diagnose the rubber-asphalt friction rig.\n\n\
                   All quantities are in SI units, and every name carries its unit: normal_force_n, time_s.\n\
-                  Exit status is 0 on success and 2 for bad input, with one line on stderr.",
-    disable_help_subcommand = true
+                  Exit status: 0 done; 2 bad input; 3 the run failed or ended before its time; 4 the rig is lost or \
+                  does not answer; 5 no space left for the results. One line on stderr says why."
 )]
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    shared: Shared,
 }
 
 /// Declares the subcommands: one line each.
@@ -58,6 +66,12 @@ macro_rules! commands {
             fn run(self) -> Result<(), InputError> {
                 match self {
                     $(Self::$name(args) => args.run(),)*
+                }
+            }
+
+            fn name(&self) -> String {
+                match self {
+                    $(Self::$name(_) => stringify!($name).to_lowercase(),)*
                 }
             }
         }
@@ -77,6 +91,13 @@ commands! {
     Run(run::Run),
     Monitor(monitor::Monitor),
     Settings(settings::Settings),
+    Convert(convert::Convert),
+    Completions(convert::Completions),
+}
+
+/// The command line, for what describes it: completions, tests.
+fn command_line() -> clap::Command {
+    <Cli as clap::CommandFactory>::command()
 }
 
 /// Runs the tool with the arguments of the process.
@@ -86,16 +107,18 @@ pub fn main() -> ExitCode {
 
 /// Runs the tool with these arguments, its name first.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
-    let cli = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => return refuse_arguments(&error),
     };
-    match cli.command.run() {
+    same_logs::warn_of(&arguments);
+    let name = cli.command.name();
+    let result = cli.shared.begin().and_then(|()| cli.command.run());
+    cli.shared.end(&name, &result);
+    match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("rig: {error}");
-            ExitCode::from(BAD_INPUT)
-        }
+        Err(error) => ExitCode::from(error.kind().exit_status()),
     }
 }
 
@@ -118,12 +141,11 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent_and_every_subcommand_shows_an_example() {
-        Cli::command().debug_assert();
-        for command in Cli::command().get_subcommands() {
+        command_line().debug_assert();
+        for command in command_line().get_subcommands() {
             let help = command.clone().render_long_help().to_string();
             assert!(help.contains("Example"), "{}", command.get_name());
         }

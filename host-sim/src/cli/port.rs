@@ -6,16 +6,18 @@ use crate::files::log::Log;
 use crate::input_error::InputError;
 use crate::link::ask::Ask;
 use crate::link::client::Client;
-use crate::link::procedure::{Procedure, perform};
+use crate::link::procedure::{Procedure, Transport, perform};
 use crate::link::serial::Serial;
+use crate::link::usb;
 use rig_link::message::{Answer, Command};
 
 /// `--port`
 #[derive(clap::Args, Debug)]
 pub(super) struct PortArgs {
-    /// Serial port of the firmware: the ST-LINK's, e.g. /dev/ttyACM0 or COM5
-    #[arg(long, value_name = "PORT")]
-    port: String,
+    /// Serial port of the firmware: the ST-LINK's, e.g. /dev/ttyACM0 or COM5; where left out, the one ST-LINK that
+    /// is plugged in
+    #[arg(long, value_name = "PORT", global = true)]
+    port: Option<String>,
 }
 
 /// An open link.
@@ -27,14 +29,49 @@ pub(super) struct Port {
 impl PortArgs {
     /// Opens the port.
     pub(super) fn open(&self) -> Result<Port, InputError> {
-        Ok(Port { serial: Serial::open(&self.port)?, client: Client::new() })
+        let name = match &self.port {
+            Some(name) => name.clone(),
+            None => usb::only_probe()?,
+        };
+        Ok(Port { serial: Serial::open(&name)?, client: Client::new() })
     }
 }
 
 impl Port {
     /// Does a procedure; its notes go to stderr.
     pub(super) fn perform<P: Procedure>(&mut self, procedure: &mut P) -> Result<P::Outcome, InputError> {
-        perform(&mut self.serial, &mut self.client, procedure, |note| eprintln!("rig: {note}"))
+        self.perform_with(procedure, |_| {})
+    }
+
+    /// The same; `each` sees it after each of its steps.
+    pub(super) fn perform_with<P: Procedure>(
+        &mut self,
+        procedure: &mut P,
+        each: impl FnMut(&mut P),
+    ) -> Result<P::Outcome, InputError> {
+        perform(&mut self.serial, &mut self.client, procedure, |note| eprintln!("rig: {note}"), each)
+    }
+
+    /// The same without a word on stderr: the procedure shows its notes itself.
+    pub(super) fn perform_quietly<P: Procedure>(
+        &mut self,
+        procedure: &mut P,
+        each: impl FnMut(&mut P),
+    ) -> Result<P::Outcome, InputError> {
+        perform(&mut self.serial, &mut self.client, procedure, |_| {}, each)
+    }
+
+    /// The port's name.
+    pub(super) fn name(&self) -> String {
+        self.serial.name()
+    }
+
+    /// Sends a request whose answer nobody waits for, to a rig that may be gone.
+    pub(super) fn send_last(&mut self, command: Command) {
+        self.client.request(command);
+        let bytes = self.client.take_outgoing();
+        // A rig that cannot be reached stops by itself.
+        let _ = self.serial.send(&bytes);
     }
 
     /// Asks one thing.
@@ -44,11 +81,16 @@ impl Port {
     }
 }
 
-/// Notes in the log who recorded it.
-pub(super) fn sign(log: &mut Log, hello: &Hello, rows_missing: u64) {
+/// Notes in the log which firmware recorded it.
+pub(super) fn sign_firmware(log: &mut Log, hello: &Hello) {
     let build: String = hello.build_id.iter().map(|byte| format!("{byte:02x}")).collect();
     log.metadata.push(("firmware".into(), hello.version.as_str().into()));
     log.metadata.push(("build_id".into(), build));
+}
+
+/// Notes in the log who recorded it.
+pub(super) fn sign(log: &mut Log, hello: &Hello, rows_missing: u64) {
+    sign_firmware(log, hello);
     log.metadata.push(("rows_missing".into(), rows_missing.to_string()));
 }
 

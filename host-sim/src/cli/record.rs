@@ -4,10 +4,13 @@ use std::path::PathBuf;
 
 use rig_link::capture::CaptureTrigger;
 
-use super::common::say;
-use super::port::{PortArgs, every_ticks, sign};
-use crate::files::output_dir::OutputDir;
-use crate::input_error::InputError;
+use super::common::{say, warn};
+use super::interrupt;
+use super::keeper::Keeper;
+use super::port::{Port, PortArgs, every_ticks, sign};
+use crate::files::journal;
+use crate::files::output_dir::{OutputDir, note_written};
+use crate::input_error::{InputError, Kind};
 use crate::link::capture::ReadCapture;
 use crate::link::record::Record;
 use crate::link::rows::{self, Zero};
@@ -74,29 +77,85 @@ impl RecordArgs {
         }
         let every_ticks = every_ticks(self.rate_hz)?;
         let wanted = self.capture.as_deref().map(trigger).transpose()?;
-        let mut output = OutputDir::new(&self.out)?;
-        let mut port = self.port.open()?;
-        let (mut log, hello, missing) = match wanted {
-            None => {
-                let recorded = port.perform(&mut Record::new(every_ticks, self.seconds, true))?;
-                let log = rows::log(&recorded.rows, &recorded.scale, Zero::FirstRow);
-                (log, recorded.hello, rows::missing(&recorded.rows))
-            }
-            Some(wanted) => {
-                let mut procedure = match wanted {
-                    Wanted::Armed => ReadCapture::new(None),
-                    Wanted::Now => ReadCapture::now(),
-                    Wanted::At(trigger) => ReadCapture::new(Some(trigger)),
-                };
-                let captured = port.perform(&mut procedure)?;
-                (captured.log(), captured.hello, 0)
-            }
-        };
-        sign(&mut log, &hello, missing);
-        output.write_log(&log)?;
-        let folder = output.folder().to_path_buf();
-        output.finish()?;
-        say(&format!("{} rows written to {}", log.len(), folder.display()));
-        Ok(())
+        let output = OutputDir::new(&self.out)?;
+        interrupt::count_signals();
+        let port = self.port.open()?;
+        match wanted {
+            None => telemetry(output, port, every_ticks, self.seconds),
+            Some(wanted) => capture(output, port, &wanted),
+        }
     }
+}
+
+fn telemetry(
+    mut output: OutputDir,
+    mut port: Port,
+    every_ticks: u16,
+    seconds: f64,
+) -> Result<(), InputError> {
+    let mut procedure = Record::new(every_ticks, seconds, true);
+    let mut keeper = Keeper::new(output.folder(), &[], Zero::FirstRow);
+    let mut full = None;
+    let mut stopped = false;
+    let done = port.perform_with(&mut procedure, |procedure| {
+        if interrupt::count() > 0 {
+            stopped = true;
+            procedure.finish_early();
+        }
+        if let Some(so_far) = procedure.recorded()
+            && !keeper.look(&so_far.rows, &so_far.scale, &so_far.hello)
+            && full.is_none()
+        {
+            full = keeper.take_error();
+            procedure.finish_early();
+        }
+    });
+    let (recorded, lost) = match done {
+        Ok(recorded) => (Some(recorded), None),
+        Err(error) => (procedure.recorded().cloned(), Some(error)),
+    };
+    let Some(recorded) = recorded.filter(|recorded| !recorded.rows.is_empty()) else {
+        let nothing = || InputError::new("ended before anything was recorded").of_kind(Kind::Run);
+        return Err(lost.unwrap_or_else(nothing));
+    };
+    keeper.keep(&recorded.rows, &recorded.scale, &recorded.hello);
+    let ended = match (&lost, stopped) {
+        (Some(error), _) => error.to_string(),
+        (None, true) => interrupt::BY_USER.to_owned(),
+        (None, false) => "when it was long enough".to_owned(),
+    };
+    let mut log = rows::log(&recorded.rows, &recorded.scale, Zero::FirstRow);
+    log.metadata.push((journal::KEY.into(), ended.clone()));
+    sign(&mut log, &recorded.hello, rows::missing(&recorded.rows));
+    match output.write_log(&log).and_then(|()| output.finish()) {
+        Ok(()) => keeper.discard(),
+        Err(error) => {
+            if let Some(path) = keeper.leave(&ended) {
+                warn(&format!("what was recorded is in {}", path.display()));
+                note_written(path);
+            }
+            return Err(lost.unwrap_or(error));
+        }
+    }
+    say(&format!("{} rows", log.len()));
+    lost.or(full).map_or(Ok(()), Err)
+}
+
+fn capture(mut output: OutputDir, mut port: Port, wanted: &Wanted) -> Result<(), InputError> {
+    let mut procedure = match wanted {
+        Wanted::Armed => ReadCapture::new(None),
+        Wanted::Now => ReadCapture::now(),
+        Wanted::At(trigger) => ReadCapture::new(Some(*trigger)),
+    };
+    let captured = port.perform_with(&mut procedure, |procedure| {
+        if interrupt::count() > 0 {
+            procedure.give_up(interrupt::BY_USER);
+        }
+    })?;
+    let mut log = captured.log();
+    sign(&mut log, &captured.hello, 0);
+    output.write_log(&log)?;
+    output.finish()?;
+    say(&format!("{} rows", log.len()));
+    Ok(())
 }

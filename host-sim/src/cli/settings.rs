@@ -1,5 +1,6 @@
 //! `rig settings`: what is stored in the firmware.
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use rig_link::message::{Answer, Command};
@@ -16,9 +17,12 @@ use crate::link::{model_upload, words};
 #[derive(clap::Args, Debug)]
 #[command(after_long_help = "\
 Example:
-  rig settings --port /dev/ttyACM0 list
-  rig settings --port /dev/ttyACM0 set friction_bridge.zero_code=32790 friction_bridge.unit_per_code=0.000366
-  rig settings --port /dev/ttyACM0 model model-extended.toml
+  rig settings list
+  rig settings list --port /dev/ttyACM0
+  rig settings set friction_bridge.zero_code=32790 friction_bridge.unit_per_code=0.000366
+  rig settings model                       shows the observer's model
+  rig settings model model-extended.toml   gives it another one
+  rig settings model forget                goes back to the default
 
 Settings have SI units, shown in the list beside what is in force, what is stored and the default. Changes
 are checked by the firmware against its limits, kept in its flash, and possible only while the rig is disabled.
@@ -52,12 +56,16 @@ enum Action {
         #[arg(required = true, value_name = "NAME")]
         names: Vec<String>,
     },
-    /// Erase everything that is stored, the model too: the way out of damaged settings
-    Erase,
-    /// Give the observer a model
+    /// Erase everything that is stored, the model too: the way out of damaged settings. Asks first
+    Erase {
+        /// Do not ask
+        #[arg(long)]
+        yes: bool,
+    },
+    /// Show the observer's model, give it another one, or go back to the default
     Model {
-        /// Model file (TOML); without it the model is forgotten and the default runs
-        #[arg(value_name = "MODEL.toml")]
+        /// Model file (TOML) to upload; `forget` for the default; nothing shows the model in force
+        #[arg(value_name = "MODEL.toml|forget")]
         file: Option<PathBuf>,
     },
     /// Take what both bridges read now as zero, until the next start
@@ -108,11 +116,17 @@ impl Settings {
             Action::Forget { names } => {
                 each(names, |name| Ok(Command::SettingForget { key: find(name)?.key }))?
             }
-            Action::Erase => vec![Command::SettingsErase],
+            Action::Erase { yes } => {
+                if !yes {
+                    ask_before_erasing()?;
+                }
+                vec![Command::SettingsErase]
+            }
+            Action::Model { file: None } => vec![Command::ModelGet],
+            Action::Model { file: Some(file) } if file.as_os_str() == "forget" => vec![Command::ModelForget],
             Action::Model { file: Some(file) } => {
                 vec![Command::ModelSet(model_upload::record(&ModelFile::read(file, &[])?)?)]
             }
-            Action::Model { file: None } => vec![Command::ModelForget],
             Action::Tare => vec![Command::Tare],
             Action::ClearFault => vec![Command::ClearFault],
         };
@@ -124,10 +138,29 @@ impl Settings {
         for command in commands {
             match port.ask(command)? {
                 Answer::Setting(state) => say(&words::setting(&state)),
+                Answer::Model(model) => say(&words::model(model.as_ref())),
                 answer => words::accepted(&answer)?,
             }
         }
         Ok(())
+    }
+}
+
+/// Asks the person at the terminal; without one, `--yes` is wanted.
+fn ask_before_erasing() -> Result<(), InputError> {
+    let refuse = |problem: &str| {
+        Err(InputError::new(problem).file("settings erase").allowed("--yes, or the answer yes at a terminal"))
+    };
+    if !std::io::stdin().is_terminal() {
+        return refuse("erases every stored setting and the model, and nobody can be asked");
+    }
+    eprint!("Erase every stored setting and the model, calibration too? [yes/no] ");
+    let mut answer = String::new();
+    let read = std::io::stdin().read_line(&mut answer);
+    if read.is_ok() && answer.trim().eq_ignore_ascii_case("yes") {
+        Ok(())
+    } else {
+        refuse("nothing was erased")
     }
 }
 

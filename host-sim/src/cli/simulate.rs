@@ -17,6 +17,7 @@ use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 use crate::lockstep::Setup;
 use crate::plant::{ElementParameters, PERIOD_S, left_out};
+use crate::provenance;
 use crate::report::{Block, Chart, Page};
 use crate::studies::contenders::rubber_of;
 use crate::studies::{patch_crossing, speed_sweep};
@@ -70,6 +71,7 @@ impl Simulate {
         if let Some(warning) = model.friction_model(PERIOD_S)?.warning() {
             eprintln!("rig: {}: {warning}", model.source);
         }
+        provenance::note("seed of the sensors' noise", &experiment.seed.to_string());
         let mut output = OutputDir::new(&self.out)?;
         let started = Instant::now();
         match &experiment.study {

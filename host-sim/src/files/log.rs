@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::signal::{SIGNALS, Signal};
-use super::{log_check, log_csv, log_parquet};
+use super::{import, log_check, log_csv, log_mcap, log_parquet, plausible};
 use crate::input_error::InputError;
 
 /// Cells of a column.
@@ -105,15 +105,12 @@ impl Log {
     pub const GAP_RULE: &'static str =
         "steps up to 6 ms, and any step up to 10 times the 90th percentile of the log's steps";
 
-    /// Reads a log, Parquet if the name ends so, else CSV, and checks it.
+    /// Reads a log, Parquet if the name ends so, else text ([`import`]), and checks it: its form, and whether its
+    /// values can be what their columns say. Doubts become notices.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        let log = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
-            log_parquet::read(path)?
-        } else {
-            let bytes = std::fs::read(path).map_err(|e| InputError::io(path, "read", &e))?;
-            log_csv::parse(&path.display().to_string(), &bytes)?
-        };
+        let log = import::read(path)?;
         log_check::check(&log)?;
+        plausible::check(&log)?;
         Ok(log)
     }
 
@@ -132,6 +129,11 @@ impl Log {
     /// The log as the bytes of a Parquet file: equal logs give equal bytes.
     pub fn to_parquet(&self) -> Result<Vec<u8>, InputError> {
         log_parquet::write(self)
+    }
+
+    /// The log as the bytes of an MCAP file, for viewers: equal logs give equal bytes.
+    pub fn to_mcap(&self) -> Result<Vec<u8>, InputError> {
+        log_mcap::write(self)
     }
 
     /// Number of samples.

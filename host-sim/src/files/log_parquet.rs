@@ -18,16 +18,16 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{Type, TypePtr};
 
+use super::import::columns::Columns;
 use super::log::{Cells, Column, Log};
 use super::number;
-use super::signal::Signal;
 use crate::input_error::InputError;
 
 /// Metadata that other writers add about themselves.
 const NOT_OURS: [&str; 2] = ["ARROW:schema", "pandas"];
 
-/// Reads a log; checks its form, not what time does.
-pub(super) fn read(path: &Path) -> Result<Log, InputError> {
+/// Reads a log; checks its form, not what time does. `meant` says which columns are signals.
+pub(super) fn read(path: &Path, meant: &Columns) -> Result<Log, InputError> {
     let source = path.display().to_string();
     let refuse = |e: &ParquetError| {
         InputError::in_file(path, format!("cannot be read as Parquet: {e}"))
@@ -62,7 +62,9 @@ pub(super) fn read(path: &Path) -> Result<Log, InputError> {
             let column = group.get_column_reader(at).map_err(|e| refuse(&e))?;
             values.append(column, rows).map_err(|e| refuse(&e))?;
         }
-        let cells = values.into_cells(&name).map_err(|e| e.file(log.source.as_str()))?;
+        let cells = values
+            .into_cells(&name, meant.signal_of(&name).is_some())
+            .map_err(|e| e.file(log.source.as_str()))?;
         log.columns.push(Column { name, cells });
     }
     if log.is_empty() {
@@ -111,8 +113,7 @@ impl Values {
         }
     }
 
-    fn into_cells(self, name: &str) -> Result<Cells, InputError> {
-        let known = Signal::named(name).is_some();
+    fn into_cells(self, name: &str, known: bool) -> Result<Cells, InputError> {
         let refuse = |problem: String| Err(InputError::new(problem).key(name).allowed("finite numbers"));
         if let Some(what) = self.unreadable {
             return refuse(format!("a column of {what}"));

@@ -110,7 +110,11 @@ impl ModelFile {
 
     /// Reads a file, or takes the assumed model where none is given.
     pub fn read_or_assumed(path: Option<&Path>, changes: &[(String, String)]) -> Result<Self, InputError> {
-        path.map_or_else(|| Self::assumed(changes), |path| Self::read(path, changes))
+        let Some(path) = path else {
+            crate::provenance::note("model", "assumed: no file was given");
+            return Self::assumed(changes);
+        };
+        Self::read(path, changes)
     }
 
     /// Parses and checks a text.

@@ -1,16 +1,60 @@
 //! Results are written all or not at all.
 //!
-//! Files are collected in a hidden folder beside the wanted one, then moved into place when everything
-//! is there. A failure before that leaves nothing behind, neither files nor folders. Files of the same
-//! names from an earlier run are replaced, other files in the folder are kept. Moving several files is
-//! not one step of the file system: what can fail there is tried before (the folder can be made and
-//! written to, no target is a folder).
+//! Files are kept in memory until everything is there, then written beside their places under `NAME.part`, and
+//! moved into place. A failure before that leaves nothing behind, neither files nor folders; other files in the
+//! folder are kept. What can fail is tried before the work is done: the folder can be made and written to.
+//! A folder that holds results already is refused unless overwriting was allowed, as a recording cannot be made
+//! again. Moving several files is not one step of the file system.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::journal::{self, Unfinished};
 use super::log::Log;
 use crate::input_error::InputError;
+
+/// What the commands write: a folder with one of these holds results.
+const RESULTS: [&str; 15] = [
+    "log.csv",
+    "summary.json",
+    "report.html",
+    "curves.csv",
+    "prediction.csv",
+    "model.toml",
+    "model-extended.toml",
+    "diagnosis.json",
+    "design.json",
+    "experiment.toml",
+    "next-experiment.toml",
+    "capture.csv",
+    "defmt.log",
+    "commissioning.json",
+    journal::NAME,
+];
+
+/// `--force` of this process.
+static OVERWRITE: AtomicBool = AtomicBool::new(false);
+/// What this process has written.
+static WRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// From now on results replace those of earlier runs.
+pub fn allow_overwriting() {
+    OVERWRITE.store(true, Ordering::Relaxed);
+}
+
+/// The files written since the last call.
+pub fn take_written() -> Vec<PathBuf> {
+    WRITTEN.lock().map_or_else(|_| Vec::new(), |mut written| std::mem::take(&mut *written))
+}
+
+/// Notes a file that stands for good.
+pub fn note_written(path: PathBuf) {
+    if let Ok(mut written) = WRITTEN.lock() {
+        written.push(path);
+    }
+}
 
 /// A folder of results that comes into being with [`OutputDir::finish`].
 #[derive(Debug)]
@@ -18,10 +62,10 @@ pub struct OutputDir {
     target: PathBuf,
     /// Name of the main table where it is to be Parquet.
     parquet_name: Option<String>,
-    staging: Option<PathBuf>,
     /// Folders made on the way to the target, innermost last.
     made: Vec<PathBuf>,
-    names: Vec<String>,
+    files: Vec<(String, Vec<u8>)>,
+    overwrite: bool,
 }
 
 impl OutputDir {
@@ -29,6 +73,15 @@ impl OutputDir {
     ///
     /// Everything that can be known to fail fails here, before the work is done.
     pub fn new(out: &Path) -> Result<Self, InputError> {
+        Self::prepare(out, OVERWRITE.load(Ordering::Relaxed))
+    }
+
+    /// The same for a folder whose results may be replaced at any time.
+    pub fn replacing(out: &Path) -> Result<Self, InputError> {
+        Self::prepare(out, true)
+    }
+
+    fn prepare(out: &Path, overwrite: bool) -> Result<Self, InputError> {
         let parquet = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let (target, parquet_name) = match (parquet, out.file_name()) {
             (true, Some(name)) => {
@@ -45,12 +98,29 @@ impl OutputDir {
                 InputError::in_file(&target, "is a file, not a folder").allowed("a folder for the results")
             );
         }
-        let mut output = Self { target, parquet_name, staging: None, made: Vec::new(), names: Vec::new() };
+        let mut output = Self { target, parquet_name, made: Vec::new(), files: Vec::new(), overwrite };
+        output.refuse_results()?;
         output.make_folders()?;
-        let staging = output.target.join(format!(".rig-{}", std::process::id()));
-        fs::create_dir(&staging).map_err(|e| InputError::io(&output.target, "write into it", &e))?;
-        output.staging = Some(staging);
+        // A file without a name: nothing is left of it, however this ends.
+        tempfile::tempfile_in(&output.target)
+            .map_err(|e| InputError::io(&output.target, "write into it", &e))?;
         Ok(output)
+    }
+
+    fn refuse_results(&self) -> Result<(), InputError> {
+        if self.overwrite {
+            return Ok(());
+        }
+        let names = RESULTS.into_iter().chain(self.parquet_name.as_deref());
+        let there: Vec<&str> = names.filter(|name| self.target.join(name).exists()).collect();
+        if there.is_empty() {
+            return Ok(());
+        }
+        let what = match Unfinished::in_folder(&self.target) {
+            Some(unfinished) => format!("holds {}", unfinished.sentence()),
+            None => format!("holds results already: {}", there.join(", ")),
+        };
+        Err(InputError::in_file(&self.target, what).allowed("another folder, or --force to replace them"))
     }
 
     fn make_folders(&mut self) -> Result<(), InputError> {
@@ -83,13 +153,12 @@ impl OutputDir {
         if target.is_dir() {
             return Err(InputError::in_file(&target, "is a folder where a file is to be written"));
         }
-        let Some(staging) = &self.staging else {
-            return Err(InputError::new("results are already in place"));
-        };
-        fs::write(staging.join(name), bytes).map_err(|e| InputError::io(&target, "write", &e))?;
-        if !self.names.iter().any(|known| known == name) {
-            self.names.push(name.into());
+        if !self.overwrite && target.exists() {
+            return Err(InputError::in_file(&target, "is there already")
+                .allowed("another folder, or --force to replace it"));
         }
+        self.files.retain(|(known, _)| known != name);
+        self.files.push((name.into(), bytes.as_ref().to_vec()));
         Ok(())
     }
 
@@ -117,12 +186,23 @@ impl OutputDir {
         self.write(name, text)
     }
 
-    /// Moves everything into place.
+    /// Puts everything into place.
     pub fn finish(mut self) -> Result<(), InputError> {
-        let Some(staging) = self.staging.clone() else { return Ok(()) };
-        for name in &self.names {
+        let files = std::mem::take(&mut self.files);
+        let part = |name: &str| self.target.join(format!("{name}.part"));
+        for (at, (name, bytes)) in files.iter().enumerate() {
+            if let Err(error) = fs::write(part(name), bytes) {
+                for (name, _) in files.iter().take(at + 1) {
+                    // What cannot be removed is not worth an error of its own.
+                    let _ = fs::remove_file(part(name));
+                }
+                return Err(InputError::io(&self.target.join(name), "write", &error));
+            }
+        }
+        for (name, _) in &files {
             let target = self.target.join(name);
-            fs::rename(staging.join(name), &target).map_err(|e| InputError::io(&target, "write", &e))?;
+            fs::rename(part(name), &target).map_err(|e| InputError::io(&target, "write", &e))?;
+            note_written(target);
         }
         self.made.clear();
         Ok(())
@@ -131,10 +211,7 @@ impl OutputDir {
 
 impl Drop for OutputDir {
     fn drop(&mut self) {
-        // Tidying up: what cannot be removed is not worth an error of its own.
-        if let Some(staging) = &self.staging {
-            let _ = fs::remove_dir_all(staging);
-        }
+        // Folders that hold something by now stay.
         for path in self.made.iter().rev() {
             let _ = fs::remove_dir(path);
         }
@@ -163,11 +240,19 @@ mod tests {
     }
 
     #[test]
-    fn a_finished_output_replaces_its_files_and_keeps_others() {
+    fn results_are_replaced_by_permission_only_and_other_files_are_kept() {
         let root = tempfile::tempdir().unwrap();
+        fs::write(root.path().join("summary.json"), "old").unwrap();
         fs::write(root.path().join("x.json"), "old").unwrap();
         fs::write(root.path().join("mine.txt"), "kept").unwrap();
-        let mut output = OutputDir::new(root.path()).unwrap();
+        let error = OutputDir::prepare(root.path(), false).unwrap_err().to_string();
+        assert!(error.contains("holds results already: summary.json; allowed: another folder"), "{error}");
+        fs::remove_file(root.path().join("summary.json")).unwrap();
+        let mut output = OutputDir::prepare(root.path(), false).unwrap();
+        let error = output.write("x.json", "new").unwrap_err().to_string();
+        assert!(error.contains("x.json: is there already"), "{error}");
+        drop(output);
+        let mut output = OutputDir::replacing(root.path()).unwrap();
         output.write("x.json", "new").unwrap();
         assert_eq!(fs::read_to_string(root.path().join("x.json")).unwrap(), "old");
         output.finish().unwrap();

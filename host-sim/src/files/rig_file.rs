@@ -113,7 +113,11 @@ impl RigFile {
 
     /// Reads a file, or takes the assumed rig where none is given.
     pub fn read_or_assumed(path: Option<&Path>, changes: &[(String, String)]) -> Result<Self, InputError> {
-        path.map_or_else(|| Self::assumed_rig(changes), |path| Self::read(path, changes))
+        let Some(path) = path else {
+            crate::provenance::note("rig", "assumed: no file was given");
+            return Self::assumed_rig(changes);
+        };
+        Self::read(path, changes)
     }
 
     /// Parses and checks a text.

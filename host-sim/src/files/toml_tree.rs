@@ -77,7 +77,9 @@ impl Document {
     /// Reads and parses a file.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let text = std::fs::read_to_string(path).map_err(|e| InputError::io(path, "read", &e))?;
-        Self::parse(&path.display().to_string(), &text)
+        let name = path.display().to_string();
+        crate::provenance::note_file(&name, text.as_bytes());
+        Self::parse(&name, &text)
     }
 
     /// Parses a text; `file` is the name that errors will give.

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use rig_link::message::{Answer, Command, Hello, Message, PROTOCOL_VERSION, Request};
 
 use super::client::Client;
-use super::procedure::{KeepAlive, Procedure, patience};
+use super::procedure::{Procedure, patience};
 use super::words;
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 /// A list of requests on its way.
 #[derive(Debug)]
@@ -17,7 +17,6 @@ pub struct Ask {
     answers: Vec<Answer>,
     /// Messages that answer nothing: telemetry, events.
     others: Vec<Message>,
-    keep_alive: KeepAlive,
     done: bool,
 }
 
@@ -35,7 +34,6 @@ impl Ask {
             asked: None,
             answers: Vec::new(),
             others: Vec::new(),
-            keep_alive: KeepAlive::default(),
             done: false,
         }
     }
@@ -44,6 +42,17 @@ impl Ask {
     pub fn push(&mut self, command: Command) {
         self.waiting.push_back(command);
         self.done = false;
+    }
+
+    /// Forgets the requests that are not on their way yet.
+    pub fn forget_waiting(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Forgets every request; nobody waits for an answer any more.
+    pub fn forget_all(&mut self) {
+        self.waiting.clear();
+        self.asked = None;
     }
 
     /// Whether every request has its answer.
@@ -91,9 +100,9 @@ impl Procedure for Ask {
             return Err(InputError::new(format!(
                 "no answer to {}; is this the rig's port, and does its firmware run?",
                 words::command(&request.command)
-            )));
+            ))
+            .of_kind(Kind::Rig));
         }
-        self.keep_alive.step(now_s, client);
         self.done = self.is_idle();
         Ok(())
     }
@@ -111,6 +120,7 @@ pub fn check_hello(answer: &Answer) -> Result<Hello, InputError> {
     let Answer::Hello(hello) = answer else { return Err(words::unexpected(answer)) };
     if hello.protocol != PROTOCOL_VERSION {
         return Err(InputError::new("the firmware speaks another version of the protocol")
+            .of_kind(Kind::Run)
             .key("protocol")
             .value(hello.protocol)
             .allowed(PROTOCOL_VERSION.to_string()));

@@ -14,7 +14,7 @@ use super::words;
 use crate::files::log::Log;
 use crate::files::number::widen;
 use crate::files::signal::Signal;
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 /// Time between two looks at the state.
 const LOOK_S: f64 = 0.1;
@@ -70,6 +70,7 @@ pub struct ReadCapture {
     bytes: Vec<u8>,
     scales: [f64; SCALES.len()],
     notes: Vec<String>,
+    given_up: Option<String>,
 }
 
 impl ReadCapture {
@@ -92,6 +93,7 @@ impl ReadCapture {
             bytes: Vec::new(),
             scales: [0.0; SCALES.len()],
             notes: Vec::new(),
+            given_up: None,
         }
     }
 
@@ -99,6 +101,11 @@ impl ReadCapture {
     #[must_use]
     pub fn now() -> Self {
         Self { trigger_when_full: true, ..Self::new(Some(CaptureTrigger::Command)) }
+    }
+
+    /// Stops waiting and reading; the capture stays armed, or complete, in the rig.
+    pub fn give_up(&mut self, why: &str) {
+        self.given_up.get_or_insert_with(|| why.to_owned());
     }
 
     fn take_answers(&mut self, answers: &[Answer], now_s: f64) -> Result<(), InputError> {
@@ -178,6 +185,12 @@ impl Procedure for ReadCapture {
     type Outcome = Captured;
 
     fn step(&mut self, now_s: f64, client: &mut Client) -> Result<(), InputError> {
+        if let Some(why) = &self.given_up {
+            let allowed = "rig record --capture armed reads it later";
+            return Err(InputError::new(format!("the capture was not read: {why}"))
+                .of_kind(Kind::Run)
+                .allowed(allowed));
+        }
         self.ask.step(now_s, client)?;
         for message in self.ask.take_others() {
             if let Message::Event(event) = message {

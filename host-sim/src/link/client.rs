@@ -15,7 +15,6 @@ pub struct Client {
     incoming: VecDeque<Message>,
     outgoing: Vec<u8>,
     next_id: u16,
-    requests: u64,
 }
 
 impl Client {
@@ -43,7 +42,6 @@ impl Client {
     pub fn request(&mut self, command: Command) -> u16 {
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1);
-        self.requests += 1;
         let mut frame = [0; MAX_FRAME];
         // Every request fits a frame: the longest is a model, and rig-link has a test for it.
         if let Ok(length) = encode(&Request { id, command }, &mut frame) {
@@ -55,12 +53,6 @@ impl Client {
     /// The bytes to send, taken out.
     pub fn take_outgoing(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.outgoing)
-    }
-
-    /// Requests made so far.
-    #[must_use]
-    pub fn requests(&self) -> u64 {
-        self.requests
     }
 
     /// Frames that came in damaged.

@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 use super::client::Client;
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 /// Something done over a link.
 pub trait Procedure {
@@ -47,7 +47,7 @@ pub trait Transport {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
 }
 
-/// Does a procedure on a transport, to its end; `tell` gets its notes.
+/// Does a procedure on a transport, to its end; `tell` gets its notes, `each` sees it after each of its steps.
 ///
 /// # Errors
 /// The transport failed, or the procedure cannot go on.
@@ -56,10 +56,13 @@ pub fn perform<P: Procedure>(
     client: &mut Client,
     procedure: &mut P,
     mut tell: impl FnMut(&str),
+    mut each: impl FnMut(&mut P),
 ) -> Result<P::Outcome, InputError> {
     let begun = Instant::now();
     let failed = |transport: &dyn Transport, doing: &str, error: &std::io::Error| {
-        InputError::new(format!("cannot {doing}: {error}")).file(transport.name())
+        InputError::new(format!("the port is gone: cannot {doing}: {error}"))
+            .file(transport.name())
+            .of_kind(Kind::Rig)
     };
     let mut bytes = Vec::new();
     loop {
@@ -67,6 +70,7 @@ pub fn perform<P: Procedure>(
             .step(begun.elapsed().as_secs_f64(), client)
             .map_err(|error| error.file(transport.name()))?;
         procedure.notes().iter().for_each(|note| tell(note));
+        each(procedure);
         let outgoing = client.take_outgoing();
         if !outgoing.is_empty() {
             transport.send(&outgoing).map_err(|error| failed(transport, "write", &error))?;
@@ -80,26 +84,23 @@ pub fn perform<P: Procedure>(
     }
 }
 
-/// Keeps the rig from thinking that the host is gone.
+/// Keeps the rig from thinking that the host is gone. Only the procedure that started a run has one: a look at the
+/// rig must not keep a run alive whose host is gone.
 #[derive(Debug, Default)]
 pub(super) struct KeepAlive {
-    requests: u64,
-    since_s: f64,
+    next_s: f64,
 }
 
 impl KeepAlive {
     /// The rig waits 0.5 s by default; a fifth of that leaves room for lost frames.
     const EVERY_S: f64 = 0.1;
 
-    /// Sends a sign of life where no other request went out for a while.
+    /// Sends a sign of life where one is due.
     pub(super) fn step(&mut self, now_s: f64, client: &mut Client) {
-        if client.requests() != self.requests {
-            self.since_s = now_s;
-        } else if now_s - self.since_s >= Self::EVERY_S {
+        if now_s >= self.next_s {
             client.request(rig_link::message::Command::KeepAlive);
-            self.since_s = now_s;
+            self.next_s = now_s + Self::EVERY_S;
         }
-        self.requests = client.requests();
     }
 }
 

@@ -8,7 +8,7 @@ use super::client::Client;
 use super::procedure::Procedure;
 use super::rows::Scale;
 use super::words;
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 const M1_COUNTS_KEY: u16 = 160;
 const M2_COUNTS_KEY: u16 = 170;
@@ -70,10 +70,25 @@ impl Record {
         }
     }
 
+    /// The rows that came since the last call, taken out: for a display that goes on for hours.
+    pub fn take_rows(&mut self) -> Vec<TelemetryRow> {
+        self.recorded.as_mut().map_or_else(Vec::new, |recorded| std::mem::take(&mut recorded.rows))
+    }
+
     /// What is there so far.
     #[must_use]
     pub fn recorded(&self) -> Option<&Recorded> {
         self.recorded.as_ref()
+    }
+
+    /// Ends the recording now.
+    pub fn finish_early(&mut self) {
+        if self.recorded.is_none() {
+            self.ask.forget_waiting();
+        }
+        if !std::mem::replace(&mut self.ending, true) {
+            self.ask.push(Command::Telemetry { every_ticks: 0 });
+        }
     }
 
     fn begin(&mut self, answers: &[Answer]) -> Result<(), InputError> {
@@ -138,7 +153,9 @@ impl Procedure for Record {
         self.ask.step(now_s, client)?;
         if self.ask.is_idle() {
             let answers = self.ask.take_answers();
-            if !answers.is_empty() && self.recorded.is_none() {
+            if !answers.is_empty() && self.recorded.is_none() && self.ending {
+                return Err(InputError::new("ended before anything was recorded").of_kind(Kind::Run));
+            } else if !answers.is_empty() && self.recorded.is_none() {
                 self.heard_s = now_s;
                 self.begin(&answers)?;
             } else if !answers.is_empty() {
@@ -149,7 +166,7 @@ impl Procedure for Record {
             self.take(message, now_s);
         }
         if self.recorded.is_some() && !self.ending && now_s - self.heard_s > 2.0 {
-            return Err(InputError::new("the rig has gone silent"));
+            return Err(InputError::new("the rig has gone silent").of_kind(Kind::Rig));
         }
         Ok(())
     }

@@ -32,7 +32,12 @@ pub enum Zero {
 /// The log of these rows.
 #[must_use]
 pub fn log(rows: &[TelemetryRow], scale: &Scale, zero: Zero) -> Log {
-    let first_tick = rows.first().map_or(0, |row| row.tick);
+    log_from(rows, scale, zero, rows.first().map_or(0, |row| row.tick))
+}
+
+/// The log of some rows of a recording whose first row came at this tick.
+#[must_use]
+pub fn log_from(rows: &[TelemetryRow], scale: &Scale, zero: Zero, first_tick: u64) -> Log {
     let time_s = |row: &TelemetryRow| {
         let ticks = match zero {
             Zero::Experiment => u64::from(row.experiment_tick.saturating_sub(1)),

@@ -2,7 +2,8 @@
 //!
 //! The rig arms only with its arm switch turned on by a person after the last disarming, so the procedure
 //! says so and tries again until it is. It ends when the rig is at rest again, or with a fault: what was
-//! recorded until then is kept.
+//! recorded until then is kept. From the start of the run on it sends the signs of life without which the rig
+//! stops by itself.
 
 use model_core::control::{Experiment, Fault, Mode, Refusal, SequencerState};
 use rig_link::message::{Answer, Command, EventKind, EventMessage, Hello, Message};
@@ -11,10 +12,10 @@ use rig_link::telemetry::{Health, TelemetryRow};
 
 use super::ask::{Ask, check_hello};
 use super::client::Client;
-use super::procedure::Procedure;
+use super::procedure::{KeepAlive, Procedure};
 use super::rows::Scale;
 use super::words;
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 /// Time between two tries to arm.
 const ARM_AGAIN_S: f64 = 0.2;
@@ -40,6 +41,8 @@ pub struct RunRecord {
     pub health: Option<Health>,
     /// The fault that ended the run early.
     pub fault: Option<u8>,
+    /// Why the host ended it early.
+    pub stopped: Option<String>,
     /// Frames that came in damaged.
     pub frames_rejected: u32,
 }
@@ -87,7 +90,9 @@ pub struct RunExperiment {
     ask: Ask,
     record: RunRecord,
     asked_for_switch: bool,
+    keep_alive: KeepAlive,
     heard_s: f64,
+    now_s: f64,
     notes: Vec<String>,
 }
 
@@ -113,10 +118,13 @@ impl RunExperiment {
                 events: Vec::new(),
                 health: None,
                 fault: None,
+                stopped: None,
                 frames_rejected: 0,
             },
             asked_for_switch: false,
+            keep_alive: KeepAlive::default(),
             heard_s: 0.0,
+            now_s: 0.0,
             notes: Vec::new(),
         }
     }
@@ -125,6 +133,45 @@ impl RunExperiment {
     #[must_use]
     pub fn wants_arm_switch(&self) -> bool {
         self.asked_for_switch && matches!(self.phase, Phase::Arming { .. })
+    }
+
+    /// Ends the run before its time, for this reason: stop, wait for rest, disarm.
+    pub fn stop(&mut self, why: &str) {
+        if self.record.stopped.is_some() || matches!(self.phase, Phase::Disarming | Phase::Done) {
+            return;
+        }
+        self.record.stopped = Some(why.to_owned());
+        self.ask.forget_waiting();
+        match self.phase {
+            Phase::Starting | Phase::Running => {
+                self.notes.push("stopping; waiting until the rig is at rest".into());
+                self.ask.push(Command::Stop);
+                self.phase = Phase::ComingToRest { since_s: self.now_s };
+            }
+            Phase::ComingToRest { .. } => {}
+            _ => self.disarm(),
+        }
+    }
+
+    /// Ends the run at once: the drives lose their torque wherever the rig is.
+    pub fn abort(&mut self, why: &str) {
+        self.record.stopped.get_or_insert_with(|| why.to_owned());
+        if !matches!(self.phase, Phase::Disarming | Phase::Done) {
+            self.ask.forget_all();
+            self.disarm();
+        }
+    }
+
+    fn disarm(&mut self) {
+        self.ask.push(Command::Disarm);
+        self.ask.push(Command::Telemetry { every_ticks: 0 });
+        self.phase = Phase::Disarming;
+    }
+
+    /// Whether the rig moves, or may: it must be told to stop before the host leaves.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        !matches!(self.phase, Phase::Greeting | Phase::Uploading | Phase::Done)
     }
 
     /// Ticks of the experiment that have run, for a progress bar.
@@ -177,9 +224,7 @@ impl RunExperiment {
         }
         let at_rest = [Mode::Armed, Mode::Disabled, Mode::Fault].iter().any(|mode| mode.number() == row.mode);
         if matches!(self.phase, Phase::ComingToRest { .. }) && at_rest {
-            self.ask.push(Command::Telemetry { every_ticks: 0 });
-            self.ask.push(Command::Disarm);
-            self.phase = Phase::Disarming;
+            self.disarm();
         }
     }
 
@@ -229,7 +274,7 @@ impl RunExperiment {
                     self.notes.push("keep clear of the rig, and turn its arm switch off and on".into());
                 }
                 if now_s - since_s > self.options.arm_patience_s {
-                    return Err(InputError::new("the arm switch was not turned on"));
+                    return Err(InputError::new("the arm switch was not turned on").of_kind(Kind::Run));
                 }
                 self.phase = Phase::Arming { since_s, again_s: now_s + ARM_AGAIN_S };
                 Ok(())
@@ -265,6 +310,8 @@ impl RunExperiment {
             Phase::Arming { since_s, .. } => {
                 answers.iter().try_for_each(|answer| self.armed_or_not(answer, since_s, now_s))
             }
+            // A stop that comes too late or too early is refused; the rig is disarmed in any case.
+            Phase::ComingToRest { .. } if self.record.stopped.is_some() => Ok(()),
             Phase::Starting | Phase::Running | Phase::ComingToRest { .. } => {
                 answers.iter().try_for_each(words::accepted)
             }
@@ -280,11 +327,13 @@ impl RunExperiment {
         let silent = matches!(self.phase, Phase::Starting | Phase::Running | Phase::ComingToRest { .. })
             && now_s - self.heard_s > SILENCE_S;
         if silent {
-            return Err(InputError::new("the rig has gone silent in the middle of the run"));
+            return Err(
+                InputError::new("the rig has gone silent in the middle of the run").of_kind(Kind::Rig)
+            );
         }
         match self.phase {
             Phase::ComingToRest { since_s } if now_s - since_s > REST_S => {
-                Err(InputError::new("the rig did not come to rest after the run"))
+                Err(InputError::new("the rig did not come to rest after the run").of_kind(Kind::Run))
             }
             _ => Ok(()),
         }
@@ -295,9 +344,13 @@ impl Procedure for RunExperiment {
     type Outcome = RunRecord;
 
     fn step(&mut self, now_s: f64, client: &mut Client) -> Result<(), InputError> {
+        self.now_s = now_s;
         self.ask.step(now_s, client)?;
         self.take_messages(now_s);
         self.advance(now_s)?;
+        if matches!(self.phase, Phase::Starting | Phase::Running | Phase::ComingToRest { .. }) {
+            self.keep_alive.step(now_s, client);
+        }
         self.record.frames_rejected = client.frames_rejected();
         self.check_time(now_s)
     }
@@ -312,6 +365,16 @@ impl Procedure for RunExperiment {
 }
 
 impl RunRecord {
+    /// Why the run ended, for the log.
+    #[must_use]
+    pub fn ended(&self) -> String {
+        match (&self.stopped, self.fault_words()) {
+            (_, Some(fault)) => fault,
+            (Some(why), None) => why.clone(),
+            (None, None) => "at the end of the experiment".into(),
+        }
+    }
+
     /// The sentence of the fault that ended the run, if one did.
     #[must_use]
     pub fn fault_words(&self) -> Option<String> {

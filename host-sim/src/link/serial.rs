@@ -7,10 +7,12 @@ use std::time::Duration;
 use serial2::SerialPort;
 
 use super::procedure::Transport;
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 /// Longest wait for bytes: how coarse the procedures' time is.
 const WAIT: Duration = Duration::from_millis(5);
+/// Longest wait for room to send: a port that takes nothing for so long is gone.
+const SEND_WAIT: Duration = Duration::from_secs(1);
 
 /// An open port.
 #[derive(Debug)]
@@ -25,7 +27,7 @@ impl Serial {
     /// # Errors
     /// There is no such port, or it cannot be opened; the message lists the ports there are.
     pub fn open(name: &str) -> Result<Self, InputError> {
-        let mut port = SerialPort::open(name, rig_link::BAUD).map_err(|error| {
+        let port = SerialPort::open(name, rig_link::BAUD).map_err(|error| {
             let reason = match error.kind() {
                 ErrorKind::NotFound => "no such port".to_owned(),
                 ErrorKind::PermissionDenied => "permission denied".to_owned(),
@@ -33,20 +35,38 @@ impl Serial {
             };
             InputError::new(format!("cannot open the port: {reason}")).file(name).allowed(ports())
         })?;
-        port.set_read_timeout(WAIT)
-            .map_err(|error| InputError::new(format!("cannot set the port up: {error}")).file(name))?;
-        Ok(Self { name: name.to_owned(), port })
+        Self::from_port(name, port)
     }
 
     /// Uses a port that is open already.
     ///
     /// # Errors
-    /// It takes no time limit.
+    /// It takes no time limit, or another `rig` uses it: two readers of one port would each get half of what comes.
     pub fn from_port(name: &str, mut port: SerialPort) -> Result<Self, InputError> {
         port.set_read_timeout(WAIT)
+            .and_then(|()| port.set_write_timeout(SEND_WAIT))
             .map_err(|error| InputError::new(format!("cannot set the port up: {error}")).file(name))?;
+        if !take(&port) {
+            return Err(InputError::new("another rig command uses this port")
+                .file(name)
+                .of_kind(Kind::Rig)
+                .allowed("one at a time"));
+        }
         Ok(Self { name: name.to_owned(), port })
     }
+}
+
+/// Takes the port for this process, until it is closed; says whether it was free.
+#[cfg(unix)]
+fn take(port: &SerialPort) -> bool {
+    use rustix::fs::{FlockOperation, flock};
+    flock(port, FlockOperation::NonBlockingLockExclusive) != Err(rustix::io::Errno::WOULDBLOCK)
+}
+
+/// The system itself gives a port to one process only.
+#[cfg(not(unix))]
+fn take(_port: &SerialPort) -> bool {
+    true
 }
 
 fn ports() -> String {
@@ -66,6 +86,8 @@ impl Transport for Serial {
     fn receive(&mut self, bytes: &mut Vec<u8>) -> std::io::Result<()> {
         let mut buffer = [0; 4096];
         match self.port.read(&mut buffer) {
+            // A port that was unplugged is at its end at once.
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(count) => bytes.extend_from_slice(buffer.get(..count).unwrap_or_default()),
             Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),

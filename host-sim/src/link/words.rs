@@ -1,12 +1,15 @@
 //! What the rig says, in words. Numbers this tool does not know are shown as numbers.
 
 use model_core::control::{Fault, Limit, Mode, Reason, Refusal};
+use model_core::extension::Extension;
+use model_core::friction::ModelKind;
 use rig_link::message::{
     Answer, Command, EventKind, EventMessage, Hello, KeptKind, KeptMessage, Rejection, ResetCause,
 };
+use rig_link::model::ModelRecord;
 use rig_link::settings;
 
-use crate::input_error::InputError;
+use crate::input_error::{InputError, Kind};
 
 fn or_number(sentence: Option<&str>, what: &str, number: u8) -> String {
     sentence.map_or_else(|| format!("{what} {number}"), str::to_owned)
@@ -16,6 +19,16 @@ fn or_number(sentence: Option<&str>, what: &str, number: u8) -> String {
 #[must_use]
 pub fn fault(number: u8) -> String {
     format!("fault {number}: {}", or_number(Fault::from_number(number).map(Fault::sentence), "fault", number))
+}
+
+/// The limits that act, by their set.
+#[must_use]
+pub fn limits(set: u16) -> String {
+    let sentences: Vec<String> = (0..16)
+        .filter(|number| set & (1 << number) != 0)
+        .map(|number| or_number(Limit::from_number(number).map(Limit::sentence), "limit", number))
+        .collect();
+    sentences.join(" ")
 }
 
 /// A mode by its number.
@@ -128,21 +141,25 @@ pub fn command(command: &Command) -> &'static str {
 /// What the rig refused, in words.
 pub fn accepted(answer: &Answer) -> Result<(), InputError> {
     match answer {
-        Answer::Refused { reason, fault } => Err(InputError::new(refused(*reason, *fault))),
+        Answer::Refused { reason, fault } => {
+            Err(InputError::new(refused(*reason, *fault)).of_kind(Kind::Run))
+        }
         Answer::Rejected(rejection) => Err(rejected(rejection)),
         _ => Ok(()),
     }
 }
 
 fn rejected(rejection: &Rejection) -> InputError {
-    let plain = |text: &str| InputError::new(text);
+    let plain = |text: &str| InputError::new(text).of_kind(Kind::Run);
     match rejection {
         Rejection::UnknownSetting => plain("the firmware does not know this setting"),
         Rejection::OutOfRange { name, value, allowed } => {
             InputError::new("refused by the rig").key(name.as_str()).value(value).allowed(allowed.as_str())
         }
         Rejection::IncompleteProgram => plain("the experiment did not arrive whole"),
-        Rejection::ImpossibleProgram { why } => plain(&format!("the rig cannot run this experiment: {why}")),
+        Rejection::ImpossibleProgram { why } => {
+            InputError::new(format!("the rig cannot run this experiment: {why}"))
+        }
         Rejection::NotDisabled => plain("possible only while the rig is disabled"),
         Rejection::Storage => {
             plain("the rig could not store it; if its settings are damaged, erase them first")
@@ -156,7 +173,37 @@ fn rejected(rejection: &Rejection) -> InputError {
 /// An answer of the wrong kind.
 #[must_use]
 pub fn unexpected(answer: &Answer) -> InputError {
-    accepted(answer).err().unwrap_or_else(|| InputError::new("the rig gave an answer of another kind"))
+    let odd = || InputError::new("the rig gave an answer of another kind").of_kind(Kind::Rig);
+    accepted(answer).err().unwrap_or_else(odd)
+}
+
+/// The observer's model as a model file; without one in store the firmware's default.
+#[must_use]
+pub fn model(stored: Option<&ModelRecord>) -> String {
+    let (model, default) = match stored {
+        Some(model) => (model.clone(), ""),
+        None => (ModelRecord::default(), "# nothing is stored: the firmware's default\n"),
+    };
+    let mut text = default.to_owned();
+    let friction = &model.friction;
+    text += &format!("kind = \"{}\"\n\n[parameters]\n", friction.kind);
+    match ModelKind::with_name(&friction.kind) {
+        Some(kind) => {
+            for (spec, value) in kind.parameters().iter().zip(&friction.values) {
+                text += &format!("{} = {value:?}\n", spec.name);
+            }
+        }
+        // The patch of the observer, or a model of a later firmware.
+        None => text += &format!("# a kind that no model file has; its values: {:?}\n", friction.values),
+    }
+    for effect in &model.effects {
+        text += &format!("\n[[extension]]\nid = \"{}\"\n", effect.id);
+        let names = Extension::with_id(&effect.id).map(Extension::names).unwrap_or_default();
+        for (name, value) in names.iter().zip(&effect.values) {
+            text += &format!("{name} = {value:?}\n");
+        }
+    }
+    text.trim_end().to_owned()
 }
 
 /// A setting with its name, values and unit, as a line of a list.

@@ -2,7 +2,9 @@
 
 pub mod chart;
 pub mod page;
+mod picture;
 pub mod simplify;
+pub mod value;
 
 pub use chart::{Chart, Line, Panel, Role, Window};
 pub use page::{Block, Page, Table};

@@ -1,7 +1,9 @@
 //! One HTML file that needs no network: text, tables and charts, readable in light and dark.
 //!
-//! plotly.js comes from the `plotly` crate and stands in the file once. Charts are data in
-//! `<script type="application/json">` and are drawn by `script.js`, which knows both colour schemes.
+//! plotly.js stands in the file once: its `basic` bundle (MIT, from the npm package plotly.js-basic-dist-min), which
+//! has lines and points and a quarter of the whole library's size. Charts are data in
+//! `<script type="application/json">` and are drawn by `script.js`, which knows both colour schemes; where no script
+//! runs, a still picture stands in their place. A page ends with where it comes from ([`crate::provenance`]).
 
 use std::fmt::Write;
 
@@ -71,11 +73,12 @@ impl Page {
                     let _ = writeln!(
                         body,
                         "<figure><figcaption><strong>{}</strong> {}</figcaption>\
-                         <div class=\"chart\" id=\"chart{charts}\" data-panels=\"{}\"></div>\
+                         <div class=\"chart\" id=\"chart{charts}\" data-panels=\"{}\"></div><noscript>{}</noscript>\
                          <script type=\"application/json\" data-chart=\"chart{charts}\">{}</script></figure>",
                         escape(&chart.title),
                         rich(&chart.caption),
                         chart.panels.len(),
+                        super::picture::svg(chart),
                         chart.to_json(),
                     );
                 }
@@ -89,27 +92,33 @@ impl Page {
             (String::new(), "", "")
         };
         let style = include_str!("style.css");
+        let footer = footer();
         let contents = if headings > 2 { format!("<nav>{contents}</nav>") } else { String::new() };
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n\
              <style>\n{style}</style>\n{library}</head>\n<body>\n<main>\n<h1>{title}</h1>\n\
-             <p class=\"lead\">{lead}</p>\n{contents}{hint}{body}</main>\n<script>\n{script}</script>\n</body>\n</html>\n"
+             <p class=\"lead\">{lead}</p>\n{contents}{hint}{body}{footer}</main>\n<script>\n{script}</script>\n</body>\n</html>\n"
         )
     }
 }
 
 impl Table {
     fn to_html(&self) -> String {
-        let cell = |tag: &str, text: &str| format!("<{tag}>{}</{tag}>", rich(text));
-        let head: String = self.head.iter().map(|t| cell("th", t)).collect();
+        let cell = |tag: &str, text: &str| {
+            format!("<{tag}>{}</{}>", rich(text), tag.split(' ').next().unwrap_or_default())
+        };
+        let head: String = self.head.iter().map(|t| cell("th scope=\"col\"", t)).collect();
         let rows: String = self
             .rows
             .iter()
             .map(|row| {
-                let cells: String =
-                    row.iter().enumerate().map(|(k, t)| cell(if k == 0 { "th" } else { "td" }, t)).collect();
+                let cells: String = row
+                    .iter()
+                    .enumerate()
+                    .map(|(k, t)| cell(if k == 0 { "th scope=\"row\"" } else { "td" }, t))
+                    .collect();
                 format!("<tr>{cells}</tr>\n")
             })
             .collect();
@@ -119,14 +128,22 @@ impl Table {
     }
 }
 
-/// The library alone: the crate's sources hold MathJax after it, which nothing here needs.
+/// The library.
 fn plotly_js() -> String {
-    let sources = plotly::Plot::offline_js_sources();
-    let end = "</script>";
-    match sources.find(end) {
-        Some(at) => sources[..at + end.len()].to_string(),
-        None => sources,
-    }
+    format!("<script>\n{}</script>\n", include_str!("plotly-basic.min.js"))
+}
+
+/// Where the page comes from.
+fn footer() -> String {
+    let rows: String = crate::provenance::lines()
+        .iter()
+        .map(|(what, value)| {
+            format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(what), escape(value))
+        })
+        .collect();
+    format!(
+        "<footer>\n<h2>Where this comes from</h2>\n<div class=\"table\"><table>\n{rows}</table></div>\n</footer>\n"
+    )
 }
 
 /// Text that is safe in HTML.
@@ -178,13 +195,14 @@ mod tests {
         assert!(html.contains("Plotly"));
         // Nothing is loaded from anywhere: no src, no stylesheet, no import.
         let library = plotly_js();
-        // MathJax, which the crate appends, would be another 2 MB.
-        assert!((3_000_000..5_500_000).contains(&library.len()), "{} bytes", library.len());
-        let own = html.replace(&library, "");
+        assert!((900_000..1_200_000).contains(&library.len()), "{} bytes", library.len());
+        let own = html.replace(&library, "").replace("http://www.w3.org/2000/svg", "");
         for forbidden in ["src=", "<link", "@import", "http:", "https:", "fetch("] {
             assert!(!own.contains(forbidden), "{forbidden}");
         }
-        assert!(!library.contains("<script src") && library.ends_with("</script>"));
+        assert!(!library.contains("<script src") && library.matches("</script>").count() == 1);
+        assert!(html.contains("<th scope=\"col\">&lt;x&gt;</th>") && html.contains("<noscript>"));
+        assert!(html.contains("Where this comes from") && html.contains(env!("CARGO_PKG_VERSION")));
     }
 
     #[test]

@@ -20,6 +20,9 @@
   const query = window.matchMedia("(prefers-color-scheme: dark)");
   const scheme = () => (query.matches ? dark : light);
 
+  // "friction torque, N m" has its unit behind the last comma.
+  const unit = (title) => (title.includes(", ") ? " " + title.slice(title.lastIndexOf(", ") + 2) : "");
+  const narrow = () => document.documentElement.clientWidth < 600;
   const axis = (n) => (n === 0 ? "" : String(n + 1));
 
   function layout(chart, c) {
@@ -28,8 +31,8 @@
     const height = (1 - gap * (rows - 1)) / rows;
     const out = {
       paper_bgcolor: c.paper, plot_bgcolor: c.paper,
-      font: { color: c.ink, size: 13, family: getComputedStyle(document.body).fontFamily },
-      margin: { l: 72, r: 16, t: 60, b: 52 },
+      font: { color: c.ink, size: narrow() ? 11 : 13, family: getComputedStyle(document.body).fontFamily },
+      margin: narrow() ? { l: 44, r: 6, t: 60, b: 44 } : { l: 72, r: 16, t: 60, b: 52 },
       legend: { orientation: "h", y: 1.0, yanchor: "bottom", x: 0, bgcolor: "rgba(0,0,0,0)" },
       hovermode: "x", dragmode: "zoom",
       hoverlabel: { bgcolor: c.paper, bordercolor: c.axis, font: { color: c.ink } },
@@ -52,11 +55,10 @@
 
   function traces(chart, c) {
     return chart.traces.map((t) => ({
-      type: chart.log || t.x.length < 4000 ? "scatter" : "scattergl",
-      mode: "lines", name: t.name, legendgroup: t.name, showlegend: t.legend, x: t.x, y: t.y,
+      type: "scatter", mode: "lines", name: t.name, legendgroup: t.name, showlegend: t.legend, x: t.x, y: t.y,
       yaxis: "y" + axis(t.row), xaxis: "x",
       line: { color: c[t.role], dash: dash[t.role], width: width[t.role] || 1.7 },
-      hovertemplate: "%{y:.5~g}",
+      hovertemplate: `%{y:.5~g}${unit(chart.panels[t.row])} at %{x:.6~g}${unit(chart.x)}`,
     }));
   }
 

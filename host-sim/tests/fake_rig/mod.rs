@@ -1,6 +1,11 @@
 //! A rig made of the control core and the plant that answers like the firmware, for tests of the host's side.
 #![allow(dead_code, unreachable_pub)] // each test uses a part of it
 
+#[cfg(unix)]
+pub mod bench;
+#[cfg(unix)]
+pub mod terminal;
+
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
@@ -132,6 +137,12 @@ impl Rig {
                 self.model = Some(model);
                 Answer::Model(self.model.clone())
             }
+            Command::ModelGet => Answer::Model(self.model.clone()),
+            Command::ModelForget => {
+                self.model = None;
+                Answer::Model(None)
+            }
+            Command::SettingsErase => Answer::Done,
             Command::Telemetry { every_ticks } => {
                 (self.every_ticks, self.until_row, self.sequence) = (every_ticks, every_ticks, 0);
                 Answer::Done
@@ -201,7 +212,7 @@ impl Rig {
         let mut heard = false;
         for byte in bytes {
             if let Some(Ok(Request { id, command })) = self.receiver.push::<Request>(*byte) {
-                heard = true;
+                heard |= command.is_sign_of_life();
                 let answer = self.carry_out(command);
                 self.say(&Message::Answer { id, answer });
             }

@@ -6,13 +6,16 @@ use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{self, Done, ObserverResidual, Request};
 use crate::firmware_build;
+use crate::serve::pace::Speed;
+use crate::serve::{self, Served};
 use clap::{ArgGroup, Parser};
 use host_sim::cli::common::{SetArgs, say, wrong_argument};
 use host_sim::cli::progress::Progress;
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
-use host_sim::files::output_dir::OutputDir;
+use host_sim::files::output_dir::{self, OutputDir};
 use host_sim::files::rig_file::RigFile;
+use host_sim::input_error::InputError;
 use host_sim::summary::{RunFacts, Summary, summarise};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -31,6 +34,7 @@ const BAD_INPUT: u8 = 2;
     after_long_help = "\
 Examples:
   cargo virtual-bench --experiment fig20 --out target/bench/fig20
+  cargo virtual-bench --serve --link /tmp/rig --arm-when-asked
   cargo virtual-bench --faults
   cargo virtual-bench --write-budget
   cargo virtual-bench --experiment fig20 --observer model-extended.toml --out target/bench/extended
@@ -38,6 +42,10 @@ Examples:
 An experiment writes log.csv (as the host tool recorded it from the serial link), capture.csv (two seconds at the full
 10 kHz around the step, read from the firmware's memory afterwards), summary.json (figures at the full rate where the
 capture has it; what the observer's model left unexplained) and defmt.log (the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
+
+--serve makes a board of it: the ELF runs in real time, prints the name of its serial port and then its log, and every
+command of rig works on that port as on a board's. The keyboard is what a person would touch at the rig; ? shows the
+keys. The rig's own time limits count its time, the host's the wall's: far from --speed 1 one of them may run out.
 Exit status: 0 on success, 2 for bad input, 1 for everything else."
 )]
 struct Cli {
@@ -50,6 +58,27 @@ struct Cli {
     /// Run all experiments and record anew what a control tick costs (budget.toml)
     #[arg(long, group = "what")]
     write_budget: bool,
+    /// Be a board: offer the serial link as a pseudo-terminal, until q or Ctrl-C
+    #[arg(long, group = "what", conflicts_with_all = ["out", "patch_observer"])]
+    serve: bool,
+    /// With --serve: seconds of the bench in one of the wall, or max
+    #[arg(long, value_name = "X|max", default_value = "1", requires = "serve")]
+    speed: Speed,
+    /// With --serve: a fixed name for the serial port, a symbolic link
+    #[arg(long, value_name = "PATH", requires = "serve")]
+    link: Option<PathBuf>,
+    /// With --serve: turn the arm switch off and on whenever the rig asks for it
+    #[arg(long, requires = "serve")]
+    arm_when_asked: bool,
+    /// With --serve: seed of the sensors' noise
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "serve")]
+    seed: u64,
+    /// With --serve: lose every N-th row of telemetry on the way to the host, to see that it is counted
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "serve")]
+    lose_every: u32,
+    /// With --serve: end by itself after so many seconds of the bench's time
+    #[arg(long, value_name = "S", requires = "serve")]
+    for_s: Option<f64>,
     /// A contact patch of 20 bristles in the firmware's observer, to see what it costs
     #[arg(long, conflicts_with = "observer")]
     patch_observer: bool,
@@ -68,6 +97,9 @@ struct Cli {
     /// This ELF in place of the one built from firmware/
     #[arg(long, value_name = "ELF")]
     elf: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     set: SetArgs,
 }
@@ -121,8 +153,36 @@ fn run(cli: Cli) -> Result<(), BenchError> {
             say(&format!("{name:<12} mean {:>7.1}  max {:>5}", cost.mean, cost.max));
         });
     }
+    if cli.serve {
+        return run_service(cli);
+    }
     let experiment = cli.experiment.clone().unwrap_or_default();
     run_experiment(cli, &experiment)
+}
+
+fn run_service(cli: Cli) -> Result<(), BenchError> {
+    let overrides = cli.set.overrides()?;
+    overrides.only(true, true, false)?;
+    if let Some(for_s) = cli.for_s.filter(|s| !(*s > 0.0 && *s < 1e9)) {
+        let error = InputError::new("out of range").file("--for-s").value(for_s);
+        return Err(error.allowed("more than 0, in seconds").into());
+    }
+    let model = ModelFile::read_or_assumed(cli.model.as_deref(), &overrides.model)?;
+    let served = Served {
+        rig: RigFile::read_or_assumed(cli.rig.as_deref(), &overrides.rig)?,
+        observer: match &cli.observer {
+            Some(path) => ModelFile::read(path, &[])?,
+            None => model.clone(),
+        },
+        model,
+        seed: cli.seed,
+        speed: cli.speed,
+        link: cli.link,
+        arm_when_asked: cli.arm_when_asked,
+        lose_every: cli.lose_every,
+        for_s: cli.for_s,
+    };
+    serve::serve(&firmware(cli.elf)?, &served)
 }
 
 fn run_faults(firmware: &Firmware) -> Result<(), BenchError> {
@@ -161,6 +221,9 @@ fn run_experiment(cli: Cli, name: &str) -> Result<(), BenchError> {
         capture: true,
     };
     let Some(out) = cli.out else { return Ok(()) };
+    if cli.force {
+        output_dir::allow_overwriting();
+    }
     let mut output = OutputDir::new(&out)?;
     let firmware = firmware(cli.elf)?;
     let started = Instant::now();
@@ -178,6 +241,9 @@ fn run_experiment(cli: Cli, name: &str) -> Result<(), BenchError> {
     }
     output.write("defmt.log", done.log.lines.join("\n") + "\n")?;
     output.finish()?;
+    let written: Vec<String> =
+        output_dir::take_written().iter().map(|path| path.display().to_string()).collect();
+    eprintln!("virtual-bench: wrote {}", written.join(", "));
     let complaints = done.complaints();
     if complaints.is_empty() { Ok(()) } else { Err(BenchError::Rig(complaints.join("; "))) }
 }

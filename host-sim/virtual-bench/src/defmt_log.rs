@@ -1,7 +1,7 @@
 //! Decodes the firmware's defmt frames into lines: `time level message`.
 
 use crate::error::BenchError;
-use defmt_decoder::{DecodeError, Table};
+use defmt_decoder::{DecodeError, StreamDecoder, Table};
 
 /// What became of the log's bytes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -33,34 +33,47 @@ fn event_number(line: &str) -> Option<u64> {
     word.strip_prefix('#')?.parse().ok().filter(|number| *number > 0)
 }
 
+/// The table of the log's strings in an ELF.
+///
+/// # Errors
+/// The ELF holds no defmt table of this decoder's version.
+pub(crate) fn table(elf: &[u8]) -> Result<Table, BenchError> {
+    Table::parse(elf)
+        .map_err(|error| BenchError::Firmware(format!("its defmt table cannot be read: {error}")))?
+        .ok_or_else(|| BenchError::Firmware("it holds no defmt table".to_owned()))
+}
+
+/// Takes the lines out of a decoder that are complete in it.
+pub(crate) fn decode_into(table: &Table, decoder: &mut dyn StreamDecoder, log: &mut DefmtLog) {
+    loop {
+        match decoder.decode() {
+            Ok(frame) => {
+                let time = frame.display_timestamp().map(|time| time.to_string()).unwrap_or_default();
+                let level = frame.level().map_or("-", |level| level.as_str());
+                log.lines.push(format!("{time} {level} {}", frame.display_message()));
+            }
+            Err(DecodeError::UnexpectedEof) => break,
+            Err(DecodeError::Malformed) => {
+                log.malformed += 1;
+                if !table.encoding().can_recover() {
+                    break;
+                }
+            }
+        }
+    }
+}
+
 /// Decodes the bytes of each start of the firmware on its own: a frame cut short by a reset ends there.
 ///
 /// # Errors
 /// The ELF holds no defmt table of this decoder's version.
 pub fn decode(elf: &[u8], starts: &[Vec<u8>]) -> Result<DefmtLog, BenchError> {
-    let table = Table::parse(elf)
-        .map_err(|error| BenchError::Firmware(format!("its defmt table cannot be read: {error}")))?
-        .ok_or_else(|| BenchError::Firmware("it holds no defmt table".to_owned()))?;
+    let table = table(elf)?;
     let mut log = DefmtLog::default();
     for bytes in starts {
         let mut decoder = table.new_stream_decoder();
         decoder.received(bytes);
-        loop {
-            match decoder.decode() {
-                Ok(frame) => {
-                    let time = frame.display_timestamp().map(|time| time.to_string()).unwrap_or_default();
-                    let level = frame.level().map_or("-", |level| level.as_str());
-                    log.lines.push(format!("{time} {level} {}", frame.display_message()));
-                }
-                Err(DecodeError::UnexpectedEof) => break,
-                Err(DecodeError::Malformed) => {
-                    log.malformed += 1;
-                    if !table.encoding().can_recover() {
-                        break;
-                    }
-                }
-            }
-        }
+        decode_into(&table, decoder.as_mut(), &mut log);
     }
     Ok(log)
 }

@@ -29,6 +29,7 @@ pub(crate) enum Question {
     WrongPins,
     Memory { address: u64, length: u64 },
     Snapshot,
+    TakeLog,
 }
 
 /// Answers and wake-ups.
@@ -39,6 +40,7 @@ pub(crate) enum ToDesk {
     Outputs(DriveInputs),
     WrongPins(Vec<String>),
     Memory(Vec<u8>),
+    Log(Vec<Vec<u8>>),
     Done(Result<(), String>),
 }
 
@@ -171,6 +173,18 @@ impl Desk {
     pub fn memory(&mut self, address: u64, length: u64) -> Result<Vec<u8>, BenchError> {
         match self.ask(Question::Memory { address, length })? {
             ToDesk::Memory(bytes) => Ok(bytes),
+            _ => Err(over()),
+        }
+    }
+
+    /// The log's bytes since the last call, one entry for each start of the firmware: the first goes on where the last
+    /// call ended. The record forgets them, and the changes of the outputs too: a run may last for days.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn take_log(&mut self) -> Result<Vec<Vec<u8>>, BenchError> {
+        match self.ask(Question::TakeLog)? {
+            ToDesk::Log(starts) => Ok(starts),
             _ => Err(over()),
         }
     }

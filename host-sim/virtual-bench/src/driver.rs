@@ -296,6 +296,10 @@ impl BenchDriver {
                     .flat_map(u64::to_le_bytes)
                     .collect(),
             ),
+            Question::TakeLog => {
+                self.record.outputs.clear();
+                ToDesk::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
+            }
             Question::Snapshot => {
                 let taken = snapshot::take(session, host, stop, &self.addresses.digest, &NothingMore);
                 ToDesk::Done(taken.map_err(|error| error.to_string()).map(|taken| {

@@ -13,6 +13,8 @@ pub enum BenchError {
     Emulator(String),
     /// The firmware used something the emulator cannot stand in for; one line a use.
     Gaps(Vec<String>),
+    /// The port for the host tool cannot be offered.
+    Port(String),
     /// The firmware did not do what was asked of it.
     Rig(String),
     /// A check failed.
@@ -29,6 +31,7 @@ impl std::fmt::Display for BenchError {
                 write!(f, "the emulator cannot stand in for {} of the firmware's accesses:", gaps.len())?;
                 gaps.iter().try_for_each(|gap| write!(f, "\n  {gap}"))
             }
+            Self::Port(why) => write!(f, "the port: {why}"),
             Self::Rig(why) => write!(f, "the rig: {why}"),
             Self::Check(why) => write!(f, "check failed: {why}"),
         }

@@ -93,25 +93,33 @@ impl Request {
         tick.min(total.saturating_sub(u32::from(every_ticks)))
     }
 
-    /// Requests that make the firmware know the rig and the observer's model.
     fn preparation(&self) -> Result<Vec<Command>, BenchError> {
-        let (wanted, own) = (control_settings(&self.rig, &self.observer), ControlSettings::default());
-        let mut commands: Vec<Command> = settings::ALL
-            .iter()
-            .filter(|info| info.get(&wanted).to_bits() != info.get(&own).to_bits())
-            .map(|info| Command::SettingSet { key: info.key, value: info.get(&wanted) })
-            .collect();
-        let mut model = model_upload::record(&self.observer)?;
-        if self.patch_observer {
-            model.friction = patch(&model.friction);
-        }
-        // What the firmware's observer runs without an upload.
-        let resident = ModelRecord { friction: (&own.observer.model).into(), effects: heapless::Vec::new() };
-        if model != resident {
-            commands.push(Command::ModelSet(model));
-        }
-        Ok(commands)
+        preparation(&self.rig, &self.observer, self.patch_observer)
     }
+}
+
+/// Requests that make the firmware know the rig and the observer's model.
+pub(crate) fn preparation(
+    rig: &RigFile,
+    observer: &ModelFile,
+    patch_observer: bool,
+) -> Result<Vec<Command>, BenchError> {
+    let (wanted, own) = (control_settings(rig, observer), ControlSettings::default());
+    let mut commands: Vec<Command> = settings::ALL
+        .iter()
+        .filter(|info| info.get(&wanted).to_bits() != info.get(&own).to_bits())
+        .map(|info| Command::SettingSet { key: info.key, value: info.get(&wanted) })
+        .collect();
+    let mut model = model_upload::record(observer)?;
+    if patch_observer {
+        model.friction = patch(&model.friction);
+    }
+    // What the firmware's observer runs without an upload.
+    let resident = ModelRecord { friction: (&own.observer.model).into(), effects: heapless::Vec::new() };
+    if model != resident {
+        commands.push(Command::ModelSet(model));
+    }
+    Ok(commands)
 }
 
 /// A patch with the bristles of a series element: 10 mm long, under 88 N as stiff.

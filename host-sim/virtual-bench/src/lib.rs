@@ -23,5 +23,6 @@ pub mod plant_side;
 pub mod record;
 pub mod rtt;
 pub mod serial;
+pub mod serve;
 
 pub use driver::PERIOD;

@@ -38,7 +38,7 @@ pub struct Request {
 pub enum Command {
     /// Who is there.
     Hello,
-    /// Nothing, but the host is still there. Any valid frame counts as much.
+    /// The host that runs the experiment is still there.
     KeepAlive,
     /// Enable the drives at zero torque.
     Arm,
@@ -110,6 +110,15 @@ pub enum Command {
     },
     /// Restart the firmware; only while disabled.
     Restart,
+}
+
+impl Command {
+    /// Whether the request shows that the host is there that runs the experiment. What others ask meanwhile, to
+    /// look on, must not keep a run alive whose host is gone.
+    #[must_use]
+    pub const fn is_sign_of_life(&self) -> bool {
+        matches!(self, Self::KeepAlive | Self::Start)
+    }
 }
 
 /// From the rig.

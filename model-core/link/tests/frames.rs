@@ -171,9 +171,9 @@ fn a_telemetry_row_at_1_khz_uses_less_than_two_thirds_of_the_line() {
 /// The wire format is the order and the types of the members: who changes them raises `PROTOCOL_VERSION` and
 /// writes the new bytes here.
 #[test]
-fn the_bytes_of_version_1_stay_as_they_are() {
+fn the_bytes_of_version_2_stay_as_they_are() {
     use rig_link::message::PROTOCOL_VERSION;
-    assert_eq!(PROTOCOL_VERSION, 1);
+    assert_eq!(PROTOCOL_VERSION, 2);
     let hex = |bytes: std::vec::Vec<u8>| {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect::<std::string::String>()
     };

@@ -43,7 +43,8 @@ impl Runner {
     #[must_use]
     pub fn tool(&self, subcommand: &str) -> Command {
         let mut command = Command::new(&self.rig);
-        command.arg(subcommand).stdout(Stdio::null());
+        // A second run with --keep replaces what the first one kept.
+        command.arg(subcommand).arg("--force").stdout(Stdio::null());
         if self.jobs > 1 {
             let cores = std::thread::available_parallelism().map_or(1, usize::from);
             command.env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string());

@@ -8,6 +8,7 @@ mod defmt;
 mod faults;
 mod figures;
 mod runs;
+mod serve;
 mod upload;
 
 use std::sync::OnceLock;

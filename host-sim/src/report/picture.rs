@@ -1,0 +1,176 @@
+//! A chart as a still picture, for readers whose browser runs no scripts: an SVG of some ten kilobytes.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::chart::{Chart, Panel};
+
+const WIDTH: u32 = 860;
+const PANEL: u32 = 220;
+const INK: RGBColor = RGBColor(118, 126, 136);
+const COLOURS: [RGBColor; 5] = [
+    RGBColor(48, 132, 204),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(190, 80, 160),
+    RGBColor(138, 90, 0),
+];
+/// Points of a line: two a pixel column, its lowest and its highest, keep every spike.
+const COLUMNS: usize = 300;
+
+type Drawn<T> = Result<T, Box<dyn std::error::Error>>;
+
+/// The picture of what the chart shows first; empty where there is nothing to draw.
+#[must_use]
+pub(super) fn svg(chart: &Chart) -> String {
+    if chart.panels.is_empty() {
+        return String::new();
+    }
+    let mut svg = String::new();
+    #[allow(clippy::cast_possible_truncation)]
+    let height = PANEL * chart.panels.len() as u32 + 30;
+    match draw(chart, height, &mut svg) {
+        // It scales with the page.
+        Ok(()) => svg.replacen(
+            &format!("width=\"{WIDTH}\" height=\"{height}\""),
+            "style=\"max-width:100%;height:auto\"",
+            1,
+        ),
+        Err(_) => String::new(),
+    }
+}
+
+fn draw(chart: &Chart, height: u32, svg: &mut String) -> Drawn<()> {
+    let root = SVGBackend::with_string(svg, (WIDTH, height)).into_drawing_area();
+    let areas = root.split_evenly((chart.panels.len().max(1), 1));
+    for (at, (panel, area)) in chart.panels.iter().zip(&areas).enumerate() {
+        draw_panel(chart, panel, area, at + 1 == chart.panels.len())?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+fn draw_panel(
+    chart: &Chart,
+    panel: &Panel,
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    last: bool,
+) -> Drawn<()> {
+    let shown = chart.windows.first().map(|window| window.range);
+    let lines: Vec<(&str, Vec<(f64, f64)>)> = panel
+        .lines
+        .iter()
+        .map(|line| {
+            let points: Vec<(f64, f64)> = line
+                .x
+                .iter()
+                .zip(&line.y)
+                .map(|(x, y)| (if chart.log_x { x.log10() } else { *x }, *y))
+                .filter(|(x, y)| x.is_finite() && y.is_finite())
+                .filter(|(x, _)| shown.is_none_or(|(from, to)| chart.log_x || (from..=to).contains(x)))
+                .collect();
+            (line.name.as_str(), if chart.plane { every(&points) } else { envelope(&points) })
+        })
+        .collect();
+    let (x, y) = (
+        bounds(lines.iter().flat_map(|(_, p)| p).map(|p| p.0)),
+        bounds(lines.iter().flat_map(|(_, p)| p).map(|p| p.1)),
+    );
+    let (Some(x), Some(y)) = (x, y) else { return Ok(()) };
+    let room = 0.06 * (y.1 - y.0);
+    let text = ("sans-serif", 13).into_font().color(&INK);
+    let mut axes = ChartBuilder::on(area)
+        .margin(6)
+        .x_label_area_size(if last { 40 } else { 20 })
+        .y_label_area_size(64)
+        .build_cartesian_2d(x.0..x.1, y.0 - room..y.1 + room)?;
+    let log_x = chart.log_x;
+    axes.configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(INK.mix(0.25))
+        .axis_style(INK)
+        .label_style(text.clone())
+        .axis_desc_style(text)
+        .x_label_formatter(&move |x| super::value::plain(if log_x { 10f64.powf(*x) } else { *x }))
+        .y_label_formatter(&|y| super::value::plain(*y))
+        .x_desc(if last { chart.x_title.as_str() } else { "" })
+        .y_desc(panel.y_title.as_str())
+        .draw()?;
+    for ((name, points), colour) in lines.into_iter().zip(COLOURS.into_iter().cycle()) {
+        axes.draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour));
+    }
+    axes.configure_series_labels()
+        .border_style(INK.mix(0.4))
+        .label_font(("sans-serif", 12).into_font().color(&INK))
+        .draw()?;
+    Ok(())
+}
+
+fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    // A line that is flat has some room too.
+    (low <= high).then(|| if high > low { (low, high) } else { (low - 0.5, high + 0.5) })
+}
+
+/// The lowest and the highest point of each column.
+fn envelope(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let size = points.len().div_ceil(COLUMNS).max(1);
+    if size <= 2 {
+        return points.to_vec();
+    }
+    points
+        .chunks(size)
+        .flat_map(|column| {
+            let by = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+            let mut ends: Vec<(f64, f64)> =
+                [column.iter().min_by(by), column.iter().max_by(by)].into_iter().flatten().copied().collect();
+            ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+            ends
+        })
+        .collect()
+}
+
+/// As many points of a curve in a plane.
+fn every(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    points.iter().step_by(points.len().div_ceil(2 * COLUMNS).max(1)).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{Line, Role, Window};
+
+    fn chart() -> Chart {
+        let x: Vec<f64> = (0..20_000).map(|k| f64::from(k) * 1e-3).collect();
+        let y = x.iter().map(|x| x.sin() + if (*x - 5.0).abs() < 5e-4 { 3.0 } else { 0.0 }).collect();
+        let line =
+            Line { name: "measured".into(), role: Role::Measured, x, y, tolerance: 0.1, fine_tolerance: 0.1 };
+        Chart {
+            x_title: "time, s".into(),
+            panels: vec![Panel { y_title: "torque, N m".into(), lines: vec![line] }],
+            windows: vec![Window { label: "all".into(), range: (0.0, 20.0) }],
+            ..Chart::default()
+        }
+    }
+
+    #[test]
+    fn a_picture_has_its_axes_with_units_and_is_small() {
+        let svg = svg(&chart());
+        assert!(svg.starts_with("<svg") && svg.contains("time, s") && svg.contains("torque, N m"), "{svg}");
+        assert!(svg.contains("measured") && svg.len() < 40_000, "{}", svg.len());
+    }
+
+    #[test]
+    fn a_lone_spike_is_not_lost() {
+        let chart = chart();
+        let line = &chart.panels[0].lines[0];
+        let points: Vec<(f64, f64)> = line.x.iter().copied().zip(line.y.iter().copied()).collect();
+        let drawn = envelope(&points);
+        assert!(drawn.len() <= 2 * COLUMNS);
+        let highest = |points: &[(f64, f64)]| points.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+        assert_eq!(highest(&drawn), highest(&points));
+        assert_eq!(svg(&Chart::default()), "");
+    }
+}

@@ -1,0 +1,267 @@
+//! The bench as a board: the ELF runs in real time with the plant behind it, its USART is a pseudo-terminal, its log
+//! goes to stdout, and the keyboard is what a person would touch at the rig.
+
+pub mod keys;
+pub mod pace;
+pub mod port;
+pub mod traffic;
+
+use crate::bench;
+use crate::defmt_log::{self, DefmtLog};
+use crate::desk::Desk;
+use crate::desk_link::perform;
+use crate::elf::Firmware;
+use crate::error::BenchError;
+use crate::experiment::{boot, preparation};
+use crate::outside::Action;
+use crate::part::Motor;
+use crate::plant_side::HostPlant;
+use defmt_decoder::{StreamDecoder, Table};
+use host_sim::cli::common::say;
+use host_sim::files::experiment_file::PlantOptions;
+use host_sim::files::model_file::ModelFile;
+use host_sim::files::rig_file::RigFile;
+use host_sim::link::ask::Ask;
+use host_sim::link::client::Client;
+use host_sim::link::words;
+use host_sim::plant::PlantParameters;
+use keys::{HELP, Key, Keyboard};
+use pace::{Pace, Speed};
+use port::Pty;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use traffic::Traffic;
+
+/// The bench looks at port, keys and clock so often, ns of its own time.
+const LOOK_NS: u64 = 1_000_000;
+/// How long the arm switch stays off before a willing person turns it on again.
+const SWITCH_NS: u64 = 20_000_000;
+
+/// What is served.
+#[derive(Debug)]
+pub struct Served {
+    /// The rig the plant is built from; the firmware gets what of it differs from its defaults as settings.
+    pub rig: RigFile,
+    /// The elements on the disc.
+    pub model: ModelFile,
+    /// The observer's model.
+    pub observer: ModelFile,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// How fast.
+    pub speed: Speed,
+    /// A fixed name for the port.
+    pub link: Option<PathBuf>,
+    /// Turn the arm switch off and on whenever the rig asks for it.
+    pub arm_when_asked: bool,
+    /// Lose every so many-th row of telemetry, 0 for none.
+    pub lose_every: u32,
+    /// End by itself after so many seconds of the bench's time.
+    pub for_s: Option<f64>,
+}
+
+/// Serves until it is told to end.
+///
+/// # Errors
+/// The port cannot be opened, the firmware does not come up, or the emulator fails.
+pub fn serve(firmware: &Firmware, served: &Served) -> Result<(), BenchError> {
+    let parameters = PlantParameters::from_files(&served.rig, &served.model, &PlantOptions::default());
+    let plant = HostPlant::new(&parameters, served.seed)?;
+    let table = defmt_log::table(&firmware.bytes)?;
+    let ended = Arc::new(AtomicBool::new(false));
+    let by_signal = Arc::clone(&ended);
+    ctrlc::set_handler(move || by_signal.store(true, Ordering::Relaxed))
+        .map_err(|error| BenchError::Port(format!("signals cannot be caught: {error}")))?;
+    let mut pty = Pty::open()?;
+    bench::run(firmware, Box::new(plant), |desk| {
+        boot(desk)?;
+        let wanted = preparation(&served.rig, &served.observer, false)?;
+        if !wanted.is_empty() {
+            let answers = perform(desk, &mut Client::new(), &mut Ask::new(wanted), |_, _, _| Ok(()))?;
+            answers.iter().try_for_each(words::accepted)?;
+        }
+        // Only now: a host that finds the link finds a rig that answers.
+        if let Some(link) = &served.link {
+            pty.link_to(link)?;
+        }
+        say(&format!("port: {}", pty.path().display()));
+        Service::new(served, pty, &table, desk.now_ns()).run(desk, &ended)
+    })?;
+    Ok(())
+}
+
+/// The operator at the desk.
+struct Service<'a> {
+    served: &'a Served,
+    pty: Pty,
+    keyboard: Keyboard,
+    traffic: Traffic,
+    table: &'a Table,
+    decoder: Box<dyn StreamDecoder + Send + Sync + 'a>,
+    begun: Instant,
+    pace: Pace,
+    outside: Switches,
+    /// When a willing person turns the arm switch on again.
+    arm_on_at: Option<u64>,
+    lost_told: u64,
+}
+
+/// How the person left what can be touched.
+#[derive(Debug, Clone, Copy, Default)]
+struct Switches {
+    armed: bool,
+    stop_pressed: bool,
+    drive_fault: bool,
+    unplugged: bool,
+    unpowered: bool,
+}
+
+impl<'a> Service<'a> {
+    fn new(served: &'a Served, pty: Pty, table: &'a Table, now_ns: u64) -> Self {
+        Self {
+            served,
+            pty,
+            keyboard: Keyboard::listen(),
+            traffic: Traffic::new(served.lose_every),
+            table,
+            decoder: table.new_stream_decoder(),
+            begun: Instant::now(),
+            pace: Pace::new(served.speed, Duration::ZERO, now_ns),
+            outside: Switches::default(),
+            arm_on_at: None,
+            lost_told: 0,
+        }
+    }
+
+    fn run(mut self, desk: &mut Desk, ended: &AtomicBool) -> Result<(), BenchError> {
+        eprintln!("virtual-bench: {HELP}");
+        let until = self.served.for_s.map(|s| desk.now_ns() + Duration::from_secs_f64(s).as_nanos() as u64);
+        while !ended.load(Ordering::Relaxed) && until.is_none_or(|until| desk.now_ns() < until) {
+            self.serve_port(desk)?;
+            self.print_log(desk)?;
+            while let Some(key) = self.keyboard.pressed() {
+                if key == Key::Quit {
+                    ended.store(true, Ordering::Relaxed);
+                }
+                self.touch(key, desk)?;
+            }
+            self.turn_switch(desk)?;
+            self.keep_pace(desk);
+        }
+        self.print_log(desk)?;
+        if self.served.lose_every > 0 {
+            eprintln!("virtual-bench: {} rows of telemetry were lost on purpose", self.traffic.rows_lost());
+        }
+        Ok(())
+    }
+
+    /// Bytes in both directions, and a step of the bench's time.
+    fn serve_port(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+        match self.pty.look() {
+            Some(true) => eprintln!("virtual-bench: a host has opened the port"),
+            Some(false) => eprintln!("virtual-bench: the host has closed the port"),
+            None => {}
+        }
+        let from_host = self.pty.receive();
+        if !from_host.is_empty() && !self.outside.unplugged {
+            desk.send(&from_host)?;
+        }
+        let from_chip = desk.receive(desk.now_ns() + LOOK_NS)?;
+        let through = self.traffic.pass(&from_chip);
+        if !self.outside.unplugged {
+            self.pty.send(&through);
+        }
+        Ok(())
+    }
+
+    fn print_log(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+        for (start, bytes) in desk.take_log()?.iter().enumerate() {
+            if start > 0 {
+                self.decoder = self.table.new_stream_decoder();
+            }
+            if bytes.is_empty() {
+                continue;
+            }
+            let mut log = DefmtLog::default();
+            self.decoder.received(bytes);
+            defmt_log::decode_into(self.table, self.decoder.as_mut(), &mut log);
+            log.lines.iter().for_each(|line| say(line));
+        }
+        Ok(())
+    }
+
+    fn touch(&mut self, key: Key, desk: &mut Desk) -> Result<(), BenchError> {
+        let x = &mut self.outside;
+        let tell = |what: &str| eprintln!("virtual-bench: {what}");
+        match key {
+            Key::ArmSwitch => {
+                x.armed = !x.armed;
+                self.arm_on_at = None;
+                tell(if x.armed { "arm switch on" } else { "arm switch off" });
+                desk.act(Action::ArmSwitch(x.armed))
+            }
+            Key::EmergencyStop => {
+                x.stop_pressed = !x.stop_pressed;
+                tell(if x.stop_pressed { "emergency stop pressed" } else { "emergency stop released" });
+                desk.act(Action::EmergencyStop(x.stop_pressed))
+            }
+            Key::DriveFault => {
+                x.drive_fault = !x.drive_fault;
+                tell(if x.drive_fault { "M2's drive reports a fault" } else { "M2's drive is healthy" });
+                desk.act(Action::DriveHealthy(Motor::M2, !x.drive_fault))
+            }
+            Key::Link => {
+                x.unplugged = !x.unplugged;
+                tell(if x.unplugged { "link unplugged" } else { "link plugged in" });
+                desk.act(Action::LinkSilent(x.unplugged))
+            }
+            Key::Reset => {
+                tell("reset");
+                desk.act(Action::ResetPin)
+            }
+            Key::Power => {
+                x.unpowered = !x.unpowered;
+                tell(if x.unpowered { "power off" } else { "power on" });
+                desk.act(Action::Power(!x.unpowered))
+            }
+            Key::Help => {
+                tell(HELP);
+                Ok(())
+            }
+            Key::Quit => Ok(()),
+        }
+    }
+
+    /// The willing person: off when the rig asks, on a moment later.
+    fn turn_switch(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+        if self.traffic.asked_for_switch() && self.served.arm_when_asked && self.arm_on_at.is_none() {
+            self.arm_on_at = Some(desk.now_ns() + SWITCH_NS);
+            self.outside.armed = false;
+            desk.act(Action::ArmSwitch(false))?;
+        }
+        if self.arm_on_at.is_some_and(|at| desk.now_ns() >= at) {
+            self.arm_on_at = None;
+            self.outside.armed = true;
+            eprintln!("virtual-bench: arm switch off and on, as asked");
+            desk.act(Action::ArmSwitch(true))?;
+        }
+        Ok(())
+    }
+
+    fn keep_pace(&mut self, desk: &Desk) {
+        let sleep = self.pace.sleep(self.begun.elapsed(), desk.now_ns());
+        if !sleep.is_zero() {
+            std::thread::sleep(sleep);
+        }
+        if let Some(behind) = self.pace.report(self.begun.elapsed()) {
+            eprintln!("virtual-bench: {}", behind.sentence());
+        }
+        let lost = self.pty.lost_bytes();
+        if lost > self.lost_told + (1 << 20) || (lost > 0 && self.lost_told == 0) {
+            self.lost_told = lost;
+            eprintln!("virtual-bench: the host does not read: {lost} bytes lost so far");
+        }
+    }
+}

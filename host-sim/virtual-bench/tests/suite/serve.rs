@@ -1,0 +1,135 @@
+//! The bench as a board: the link code of `rig` on the pseudo-terminal of a bench in a process of its own.
+
+use super::runs;
+use host_sim::files::experiment_file::ExperimentFile;
+use host_sim::files::rig_file::RigFile;
+use host_sim::input_error::InputError;
+use host_sim::link::client::Client;
+use host_sim::link::procedure::{Procedure, perform};
+use host_sim::link::record::Record;
+use host_sim::link::rows;
+use host_sim::link::run_experiment::{RunExperiment, RunOptions, RunRecord};
+use host_sim::link::serial::Serial;
+use model_core::control::{Fault, Mode};
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use virtual_bench::firmware_build;
+
+/// A served bench, as long as this lives.
+struct Board {
+    bench: Child,
+    lines: BufReader<std::process::ChildStdout>,
+    link: PathBuf,
+}
+
+impl Board {
+    fn new(name: &str, more: &[&str]) -> Self {
+        let link = std::env::temp_dir().join(format!("rig-serve-{name}-{}", std::process::id()));
+        let mut bench = Command::new(env!("CARGO_BIN_EXE_virtual-bench"))
+            .args(["--serve", "--speed", "max", "--arm-when-asked", "--link"])
+            .arg(&link)
+            .arg("--elf")
+            .arg(firmware_build::release_elf().unwrap())
+            .args(more)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(bench.stdout.take().unwrap());
+        let mut first = String::new();
+        lines.read_line(&mut first).unwrap();
+        assert_eq!(first.trim(), format!("port: {}", link.display()));
+        Self { bench, lines, link }
+    }
+
+    fn perform<P: Procedure>(
+        &self,
+        procedure: &mut P,
+        each: impl FnMut(&mut P),
+    ) -> Result<P::Outcome, InputError> {
+        let mut serial = Serial::open(self.link.to_str().unwrap()).unwrap();
+        perform(&mut serial, &mut Client::new(), procedure, |_| {}, each)
+    }
+
+    /// Presses q, and gives the rest of the log.
+    fn quit(mut self) -> String {
+        self.bench.stdin.take().unwrap().write_all(b"q").unwrap();
+        let rest: Vec<String> = BufRead::lines(&mut self.lines).map(Result::unwrap).collect();
+        assert!(self.bench.wait().unwrap().success());
+        assert!(self.link.symlink_metadata().is_err(), "the link goes with the bench");
+        rest.join("\n")
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        // Both fail where it has ended already.
+        let _ = self.bench.kill();
+        let _ = self.bench.wait();
+    }
+}
+
+fn procedure(experiment: &str) -> RunExperiment {
+    let file = ExperimentFile::named_or_read(experiment, &[]).unwrap();
+    let rig = RigFile::assumed_rig(&[]).unwrap();
+    RunExperiment::new(file.for_core(&rig).unwrap(), RunOptions::default())
+}
+
+fn friction_rms(record: &RunRecord) -> f64 {
+    let square = |torque: f32| f64::from(torque).powi(2);
+    let sum: f64 = record.rows.iter().map(|row| square(row.friction_torque_nm)).sum();
+    (sum / record.rows.len() as f64).sqrt()
+}
+
+#[test]
+fn a_run_on_the_served_bench_is_the_run_of_the_bench_and_loses_nothing() {
+    let board = Board::new("run", &[]);
+    let record = board.perform(&mut procedure("fig22"), |_| {}).unwrap();
+    let log = board.quit();
+    assert_eq!((record.fault, rows::missing(&record.rows), record.frames_rejected), (None, 0, 0));
+    let own = runs::run("fig22");
+    assert_eq!(record.rows.len(), own.run.rows.len());
+    // The noise of the sensors began at another moment; what is measured is the same.
+    let (served, itself) = (friction_rms(&record), friction_rms(&own.run));
+    assert!((served / itself - 1.0).abs() < 2e-3, "{served} {itself}");
+    assert!(log.contains("info start after PowerOn") && log.contains("Armed -> Running"), "{log}");
+}
+
+#[test]
+fn rows_lost_on_the_way_are_counted_exactly() {
+    let board = Board::new("lose", &["--lose-every", "50"]);
+    let recorded = board.perform(&mut Record::new(10, 1.02, true), |_| {}).unwrap();
+    let sent = u64::from(recorded.rows.last().unwrap().sequence) + 1;
+    assert_eq!(rows::missing(&recorded.rows), sent / 50);
+    assert_eq!(recorded.rows.len() as u64 + rows::missing(&recorded.rows), sent);
+}
+
+#[test]
+fn a_rig_whose_host_is_gone_stops_although_somebody_looks_on() {
+    let board = Board::new("gone", &[]);
+    let mut run = procedure("fig20");
+    let mut serial = Serial::open(board.link.to_str().unwrap()).unwrap();
+    // The host vanishes in the middle of the run: its port closes, and nobody says anything to the rig.
+    perform(&mut serial, &mut Client::new(), &mut UntilItMoves(&mut run), |_| {}, |_| {}).unwrap();
+    drop(serial);
+    let mut watch = Record::new(10, 1.5, true);
+    let recorded = board.perform(&mut watch, |_| {}).unwrap();
+    let last = recorded.rows.last().unwrap();
+    assert_eq!((last.mode, last.fault), (Mode::Fault.number(), Fault::LinkLost.number()));
+}
+
+/// A run that is left alone after half a second.
+struct UntilItMoves<'a>(&'a mut RunExperiment);
+
+impl Procedure for UntilItMoves<'_> {
+    type Outcome = ();
+
+    fn step(&mut self, now_s: f64, client: &mut Client) -> Result<(), InputError> {
+        self.0.step(now_s, client)
+    }
+
+    fn outcome(&mut self) -> Option<()> {
+        (self.0.progress_ticks() >= 5_000).then_some(())
+    }
+}
