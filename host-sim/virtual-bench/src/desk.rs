@@ -28,6 +28,7 @@ pub(crate) enum Question {
     Outputs,
     WrongPins,
     Memory { address: u64, length: u64 },
+    Register(u64),
     Snapshot,
 }
 
@@ -39,6 +40,7 @@ pub(crate) enum ToDesk {
     Outputs(DriveInputs),
     WrongPins(Vec<String>),
     Memory(Vec<u8>),
+    Register(u64),
     Done(Result<(), String>),
 }
 
@@ -171,6 +173,17 @@ impl Desk {
     pub fn memory(&mut self, address: u64, length: u64) -> Result<Vec<u8>, BenchError> {
         match self.ask(Question::Memory { address, length })? {
             ToDesk::Memory(bytes) => Ok(bytes),
+            _ => Err(over()),
+        }
+    }
+
+    /// A peripheral's register, as a debugger reads it.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn register(&mut self, address: u64) -> Result<u64, BenchError> {
+        match self.ask(Question::Register(address))? {
+            ToDesk::Register(value) => Ok(value),
             _ => Err(over()),
         }
     }
