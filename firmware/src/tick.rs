@@ -14,8 +14,8 @@
 //! PE13 is high from the tick's entry to its exit: the time on an oscilloscope, the instructions on an emulator.
 
 use crate::capture::Recorder;
-use crate::watchdog::Feeder;
 use crate::memory::M2_LATCHES;
+use crate::watchdog::Feeder;
 use crate::{adc_scan, board, clocks, encoders, inputs, outputs};
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;

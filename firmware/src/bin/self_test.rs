@@ -12,11 +12,14 @@ use rig_firmware::self_test::{self, Checked};
 use rig_firmware::start::{self, Started};
 use rig_firmware::{adc_scan, outputs};
 
+/// A check and its name.
+type Check = (&'static str, fn() -> Checked);
+
 #[entry]
 fn main() -> ! {
     let Started { board, .. } = start::start();
     self_test::prepare(board);
-    let checks: [(&str, fn() -> Checked); 7] = [
+    let checks: [Check; 7] = [
         ("clock", self_test::crystal),
         ("models", self_test::models),
         ("inputs", self_test::inputs),
