@@ -98,6 +98,8 @@ fn a_torque_reference_that_does_not_arrive_is_a_fault() {
     }
 }
 
+// It shows that the scan comes back in step. That a stream stopped with its interrupt on enters its handler again and
+// again is not shown: without that order this passes too.
 #[test]
 fn a_scan_cut_short_is_started_anew_and_forgiven() {
     let (before, after, restarts) = {
@@ -162,6 +164,8 @@ fn a_restart_is_done_only_while_the_drives_are_off() {
     assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled));
 }
 
+// At 30 rpm 3 µs are less than a count, so this shows that a late tick does no harm, and not what latching the counters is
+// for: that takes 300 rpm, where they are seven counts.
 #[test]
 fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
     let outcome = from(State::Sliding, |desk, witness| {
