@@ -4,15 +4,19 @@
 //! DMA's end of transfer, not the converter's end of sequence, is the tick's interrupt: only then is the
 //! last code in memory. A scan that was cut short leaves the DMA between two ranks; this is checked every
 //! tick, and the scan started anew.
+//!
+//! Writes to peripherals are posted: the core goes on while they are on their way. So a flag that holds an interrupt's
+//! line is read back after it was cleared, before the handler returns; else the core takes the same interrupt again.
 
 use crate::board::{SCAN_CHANNELS, TICK_HZ, TICK_TIMER_HZ};
 use crate::memory::{SCAN, SCAN_CODES};
 use core::sync::atomic::Ordering::Relaxed;
+use cortex_m::peripheral::NVIC;
 use embassy_stm32::adc::Adc;
 use embassy_stm32::pac::adc::vals::{Adstp, Dmngt, Exten, Ovrmod, Pcsel, Res, SampleTime};
 use embassy_stm32::pac::dma::vals::{Dir, Pl, Size};
 use embassy_stm32::pac::timer::vals::Mms;
-use embassy_stm32::pac::{ADC1, DMA1, DMAMUX1, RCC, TIM6};
+use embassy_stm32::pac::{ADC1, DMA1, DMAMUX1, Interrupt, RCC, TIM6, TIM7};
 use embassy_stm32::{Peri, peripherals, rcc};
 use model_core::control::AdcScan;
 
@@ -28,6 +32,12 @@ const ITEMS: u16 = SCAN as u16;
 pub fn start(adc: Peri<'static, peripherals::ADC1>) {
     // The driver does power-up, calibration and enabling; the scan itself is ours.
     let _ = Adc::new(adc);
+    set_up();
+}
+
+/// Sets scan and DMA up on a converter that is on: once at the start, and again after [`convert_once`].
+pub fn set_up() {
+    stop_converter();
     ADC1.sqr1().modify(|w| w.set_l(SCAN as u8 - 1));
     for (rank, channel) in SCAN_CHANNELS.into_iter().enumerate() {
         match rank {
@@ -54,9 +64,16 @@ pub fn start(adc: Peri<'static, peripherals::ADC1>) {
     arm();
 }
 
-/// Converts one channel once by software: for the loop-back test, instead of the scan.
+/// Converts one channel once by software: for the loop-back test. The scan ends with it. None if the converter does not
+/// stop or does not convert.
 #[must_use]
-pub fn convert_once(channel: u8) -> u16 {
+pub fn convert_once(channel: u8) -> Option<u16> {
+    // While ADSTART stands the registers below do not take a write (RM0433 25.6.4, 25.6.6, 25.6.8, 25.6.11).
+    stop_converter();
+    stop_stream();
+    if ADC1.cr().read().adstart() {
+        return None;
+    }
     let index = usize::from(channel);
     ADC1.sqr1().write(|w| {
         w.set_l(0);
@@ -64,7 +81,7 @@ pub fn convert_once(channel: u8) -> u16 {
     });
     ADC1.pcsel().modify(|w| w.set_pcsel(index, Pcsel::PRESELECTED));
     let (register, place) = if channel < 10 { (0, index) } else { (1, index - 10) };
-    // The DAC's buffer drives the sampling capacitor more slowly than the rig's amplifiers do.
+    // The DAC without its buffer drives the sampling capacitor more slowly than the rig's amplifiers do.
     ADC1.smpr(register).modify(|w| w.set_smp(place, SampleTime::CYCLES387_5));
     ADC1.cfgr().modify(|w| {
         w.set_res(Res::BITS16);
@@ -77,8 +94,8 @@ pub fn convert_once(channel: u8) -> u16 {
         w.set_ovr(true);
     });
     ADC1.cr().modify(|w| w.set_adstart(true));
-    while !ADC1.isr().read().eoc() {}
-    ADC1.dr().read().0 as u16
+    // A conversion takes 16 µs.
+    (0..100 * PATIENCE).any(|_| ADC1.isr().read().eoc()).then(|| ADC1.dr().read().0 as u16)
 }
 
 /// Starts the control period.
@@ -87,8 +104,17 @@ pub fn start_timer() {
     TIM6.psc().write_value(0);
     TIM6.arr().write(|w| w.set_arr((TICK_TIMER_HZ / TICK_HZ - 1) as u16));
     TIM6.cr2().modify(|w| w.set_mms(Mms::UPDATE));
-    TIM6.dier().modify(|w| w.set_uie(true));
-    TIM6.cr1().modify(|w| w.set_cen(true));
+    TIM6.dier().modify(|w| {
+        w.set_uie(true);
+        w.set_ude(true);
+    });
+    // TIM7 only requests the copy of M1's counter. Both run from one clock: what is between their starts stays.
+    rcc::enable_and_reset::<peripherals::TIM7>();
+    TIM7.psc().write_value(0);
+    TIM7.arr().write(|w| w.set_arr((TICK_TIMER_HZ / TICK_HZ - 1) as u16));
+    TIM7.dier().modify(|w| w.set_ude(true));
+    TIM6.cr1().write(|w| w.set_cen(true));
+    TIM7.cr1().write(|w| w.set_cen(true));
 }
 
 fn arm() {
@@ -109,7 +135,9 @@ fn arm() {
         w.set_eos(true);
         w.set_ovr(true);
     });
-    ADC1.cr().modify(|w| w.set_adstart(true));
+    if !ADC1.cr().read().adstart() {
+        ADC1.cr().modify(|w| w.set_adstart(true));
+    }
 }
 
 fn clear_transfer_flags() {
@@ -123,24 +151,50 @@ fn clear_transfer_flags() {
     });
 }
 
+/// Reads of a register before what was asked of it counts as not done: some ten microseconds.
+const PATIENCE: u32 = 1000;
+
+fn stop_converter() {
+    if ADC1.cr().read().adstart() {
+        ADC1.cr().modify(|w| w.set_adstp(Adstp::STOP));
+        let _ = (0..PATIENCE).any(|_| !ADC1.cr().read().adstart());
+    }
+}
+
+/// Stops the stream. That alone raises its end-of-transfer flag (RM0433 15.3.16), and with the interrupt of that flag on
+/// the handler that stopped it would be entered again and again: so the enable goes first, then the stream, then the
+/// flags, and last what is pending of them.
+fn stop_stream() {
+    let stream = DMA1.st(STREAM);
+    stream.cr().modify(|w| w.set_tcie(false));
+    stream.cr().modify(|w| w.set_en(false));
+    let _ = (0..PATIENCE).any(|_| !stream.cr().read().en());
+    clear_transfer_flags();
+    let _ = DMA1.isr(STREAM / 4).read();
+    cortex_m::asm::dsb();
+    NVIC::unpend(Interrupt::DMA1_STREAM7);
+}
+
 /// Stops converter and stream wherever they are and starts them at rank 1. Takes some microseconds.
 #[cold]
 fn restart() {
-    if ADC1.cr().read().adstart() {
-        ADC1.cr().modify(|w| w.set_adstp(Adstp::STOP));
-        for _ in 0..1000 {
-            if !ADC1.cr().read().adstart() {
-                break;
-            }
-        }
-    }
-    DMA1.st(STREAM).cr().modify(|w| w.set_en(false));
-    for _ in 0..1000 {
-        if !DMA1.st(STREAM).cr().read().en() {
-            break;
-        }
-    }
+    stop_converter();
+    stop_stream();
     arm();
+}
+
+/// The period that is over had no scan: what was left of it goes. To be called at the begin of the next period, whose
+/// scan converts its first channel for a microsecond before the stream is needed; if that is not time enough the scan
+/// does not end in step, and [`take`] starts anew.
+#[cold]
+pub fn missed() {
+    if DMA1.st(STREAM).ndtr().read().ndt() != ITEMS || ADC1.isr().read().ovr() {
+        stop_stream();
+        arm();
+    } else {
+        // Half a scan's end must not pass for the end of the next.
+        ADC1.isr().write(|w| w.set_eos(true));
+    }
 }
 
 /// What came of the scan.
@@ -157,6 +211,7 @@ pub struct Scan {
 pub fn take() -> Scan {
     let converter = ADC1.isr().read();
     let in_step = DMA1.st(STREAM).ndtr().read().ndt() == ITEMS;
+    // It lands long before the tick ends, so this one needs no reading back.
     DMA1.ifcr(STREAM / 4).write(|w| w.set_tcif(STREAM % 4, true));
     let overrun = converter.ovr() || !converter.eos() || !in_step;
     if overrun {
@@ -195,8 +250,16 @@ pub fn period_over() -> bool {
     TIM6.sr().read().uif()
 }
 
-/// Acknowledges the period.
+/// Whether a period has begun since the last call; acknowledges it. The flag is read back, so that the interrupt's line
+/// is low when this returns (ARMv7-M B3.4.1: an interrupt whose line still stands at the return is taken again).
+#[must_use]
 #[inline(always)]
-pub fn acknowledge_period() {
-    TIM6.sr().write(|w| w.set_uif(false));
+pub fn take_period() -> bool {
+    let begun = TIM6.sr().read().uif();
+    if begun {
+        TIM6.sr().write(|w| w.set_uif(false));
+        let _ = TIM6.sr().read();
+        cortex_m::asm::dsb();
+    }
+    begun
 }

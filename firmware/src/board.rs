@@ -16,6 +16,7 @@
 use embassy_stm32::gpio::{AfType, Flex, Input, Level, Output, Pull, Speed};
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::{Peri, Peripherals, pac, peripherals};
+use model_core::control::RawCaps;
 
 /// One digital line, addressed at register level where the tick and the panic handler need it.
 #[derive(Clone, Copy)]
@@ -79,6 +80,23 @@ pub const LOOP_BACK_CHANNELS: [u8; 2] = [18, 19];
 pub const M1_COUNTER_BITS: u32 = 16;
 /// Counter width of M2's encoder timer.
 pub const M2_COUNTER_BITS: u32 = 32;
+
+/// Caps in raw counts and codes: what the encoder, the converters and the amplifiers on these pins may show at most,
+/// whatever the settings say a count or a code is worth. They are those of the assumed rig; another encoder, drive or
+/// amplifier on a pin needs another number here.
+pub const CAPS: RawCaps = RawCaps {
+    // 36 rad/s of 480 000 counts a revolution at 10 kHz: 275.02.
+    m2_counts_per_tick: 275.02,
+    // M1: 215 N on the elements against 8 N of springs through 30 N/(N·m) are 7.43 of the 8 N·m at 2048 codes. M2: all.
+    dac_codes: [1903, 2048],
+    // 9.6 of the ±10 N·m that are ±32768 codes: what is above reads as clipped.
+    monitor_codes: 31_457.0,
+    // 0.3 N·m.
+    monitor_zero_codes: 1_000.0,
+    // 1 % and 99 % of the range: −17.6 N and 217.6 N.
+    normal_low_code: 656,
+    normal_high_code: 64_880,
+};
 
 /// Control ticks per second.
 pub const TICK_HZ: u32 = 10_000;

@@ -22,6 +22,8 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, pac};
 
+/// Rate of the core and of its cycle counter.
+pub const CORE_HZ: u32 = 480_000_000;
 /// Reads of the ready flag before the crystal counts as missing: some 20 ms at the 64 MHz of the start.
 const PATIENCE: u32 = 200_000;
 

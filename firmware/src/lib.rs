@@ -20,5 +20,6 @@ pub mod outputs;
 pub mod restart;
 pub mod self_test;
 pub mod settings;
+pub mod start;
 pub mod tick;
 pub mod watchdog;

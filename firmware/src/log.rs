@@ -11,7 +11,8 @@
 //! | info | changes of mode, commands that took effect |
 
 use crate::link::OUTGOING;
-use crate::{board, tick, watchdog};
+use crate::watchdog::{self, Thread};
+use crate::{board, tick};
 use embassy_time::{Duration, Ticker};
 use heapless::spsc::Consumer;
 use model_core::control::{Event, EventKind};
@@ -20,7 +21,7 @@ use rig_link::message::Message;
 // Lines carry the time of the control tick in which they were written, so that they compare with telemetry.
 defmt::timestamp!("{=u64:us}", tick::now() * (1_000_000 / board::TICK_HZ as u64));
 
-/// Time between two looks at the queue; also the threads' sign of life for the watchdog.
+/// Time between two looks at the queue.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// Logs for ever.
@@ -30,7 +31,7 @@ pub async fn log(mut events: Consumer<'static, Event>) {
     let mut number = 0u32;
     let mut unsent = 0u32;
     loop {
-        watchdog::threads_alive();
+        watchdog::alive(Thread::Log);
         while let Some(event) = events.dequeue() {
             number = number.wrapping_add(1);
             write(number, &event);

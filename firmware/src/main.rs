@@ -1,7 +1,6 @@
-//! Start of the firmware: safe first, then clock, pins, settings, control tick, link.
+//! Start of the firmware: the board (`start.rs`), then settings, control tick, link.
 //!
-//! The order matters: drive enables are driven low before anything else is set up, the DAC starts at zero
-//! torque, and the tick runs before the link can ask it for anything. Nothing here enables a drive.
+//! The tick runs before the link can ask it for anything. Nothing here enables a drive.
 #![no_std]
 #![no_main]
 
@@ -13,22 +12,12 @@ use model_core::control::ControlState;
 use rig_firmware::flash::SettingsFlash;
 use rig_firmware::link::{self, Identity, Operator};
 use rig_firmware::settings::Settings;
-use rig_firmware::{adc_scan, board, clocks, encoders, kept, log, memory, outputs, restart, tick, watchdog};
+use rig_firmware::start::{self, Started};
+use rig_firmware::{adc_scan, encoders, log, memory, restart, tick, watchdog};
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
-    let reset = restart::reset_cause();
-    let kept = kept::take();
-    let crystal = clocks::crystal_present();
-    let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
-    outputs::start();
-    clocks::yield_to_the_tick();
-    enable_core_features();
-    if crystal {
-        clocks::watch_crystal();
-    } else {
-        defmt::warn!("no 8 MHz from the ST-LINK: times and speeds may be off by 1 %");
-    }
+    let Started { reset, kept, crystal, board } = start::start();
     defmt::info!("start after {}", reset);
     if let Some(kept) = &kept {
         defmt::error!("kept from tick {=u64}: {}: {=str}", kept.tick, kept.kind, kept.text.as_str());
@@ -62,15 +51,6 @@ fn start_task<S>(spawner: Spawner, task: Result<SpawnToken<S>, SpawnError>) {
         Ok(task) => spawner.spawn(task),
         Err(_) => panic!("a task was started twice"),
     }
-}
-
-/// Instruction cache and cycle counter; the data cache stays off (`memory.rs`).
-fn enable_core_features() {
-    // SAFETY: nothing else uses the core peripherals; this runs once, before any interrupt of ours.
-    let mut core = unsafe { cortex_m::Peripherals::steal() };
-    core.SCB.enable_icache();
-    core.DCB.enable_trace();
-    core.DWT.enable_cycle_counter();
 }
 
 #[panic_handler]

@@ -32,6 +32,17 @@ pub const CAPTURE_ROWS: usize = 20_480;
 #[unsafe(link_section = ".dma.scan")]
 pub static SCAN_CODES: [AtomicU16; SCAN] = [const { AtomicU16::new(0) }; SCAN];
 
+/// M1's encoder counter at the begin of the period, written by DMA1 stream 5.
+#[unsafe(link_section = ".dma.m1_latch")]
+pub static M1_LATCH: [AtomicU32; 1] = [const { AtomicU32::new(0) }; 1];
+
+/// Periods that the ring of M2's counter holds.
+pub const M2_LATCHES: usize = 16;
+
+/// M2's encoder counter at the begin of the last periods, a ring, written by DMA1 stream 6.
+#[unsafe(link_section = ".dma.m2_latch")]
+pub static M2_LATCH: [AtomicU32; M2_LATCHES] = [const { AtomicU32::new(0) }; M2_LATCHES];
+
 /// Rows of the capture, a ring.
 #[unsafe(link_section = ".capture.rows")]
 pub static CAPTURE_WORDS: [AtomicU32; CAPTURE_ROWS * ROW_WORDS] =

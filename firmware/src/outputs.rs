@@ -2,8 +2,13 @@
 //!
 //! The DAC's channels are enabled with mid-scale already in their registers: they never show the 0 V that
 //! would mean full negative torque.
+//!
+//! The output buffers are off: buffered, the outputs end 0.2 V before either rail (DS12110, DAC characteristics), at
+//! 88 % of the rated torque. Without them the output resistance is some 15 kΩ, so the amplifier behind must draw next to
+//! nothing (`PINS.md`).
 
 use crate::board::{M1_ENABLE, M2_ENABLE};
+use embassy_stm32::pac::dac::vals::Mode;
 use embassy_stm32::pac::{DAC1, RCC};
 use embassy_stm32::{peripherals, rcc};
 use model_core::control::DAC_ZERO;
@@ -11,6 +16,11 @@ use model_core::control::DAC_ZERO;
 /// Starts the DAC at zero torque. The enables are low already (`board::configure`).
 pub fn start() {
     rcc::enable_and_reset::<peripherals::DAC1>();
+    // Only while a channel is off (RM0433 26.7.16).
+    DAC1.mcr().modify(|w| {
+        w.set_mode(0, Mode::NORMAL_EXT_BUFDIS);
+        w.set_mode(1, Mode::NORMAL_EXT_BUFDIS);
+    });
     write_references([DAC_ZERO; 2]);
     DAC1.cr().modify(|w| {
         w.set_en(0, true);

@@ -70,7 +70,7 @@ impl Stored {
     /// The configuration they make, the model included.
     fn config(&self) -> Result<ControlConfig, ParameterError> {
         let settings = self.settings()?;
-        let mut config = settings.build()?;
+        let mut config = settings.build_within(&board::CAPS)?;
         if let Some(model) = &self.model {
             config.set_model(&model.prepare(&settings)?);
         }

@@ -6,18 +6,25 @@
 //! logs, allocates or formats. What goes out goes into queues with one reader and one writer, and
 //! what finds no room is counted.
 //!
+//! **One tick a period, whatever is masked.** Of the two interrupts the DMA's has the lower number and goes first where
+//! both wait. It then takes the period's begin too, so that TIM6's finds nothing left. The number of the period comes
+//! from the DMA that latches the encoders (`encoders.rs`), and the distance of two ticks from the cycle counter: a tick
+//! at another distance than a period is counted, and too many of them are a fault.
+//!
 //! PE13 is high from the tick's entry to its exit: the time on an oscilloscope, the instructions on an emulator.
 
 use crate::capture::Recorder;
+use crate::memory::M2_LATCHES;
 use crate::watchdog::Feeder;
-use crate::{adc_scan, board, encoders, inputs, outputs};
+use crate::{adc_scan, board, clocks, encoders, inputs, outputs};
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering::{Relaxed, Release};
 use core::sync::atomic::{AtomicBool, AtomicU32};
-use cortex_m::peripheral::DWT;
+use cortex_m::peripheral::{DWT, NVIC};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::pac::Interrupt;
 use heapless::spsc::{Consumer, Producer, Queue};
 use model_core::control::{
     Command, ControlConfig, ControlState, Event, Fault, Leds, Outputs, Refused, Samples, SequencerState,
@@ -26,6 +33,13 @@ use model_core::control::{
 use rig_link::capture::CaptureTrigger;
 use rig_link::telemetry::{Health, TelemetryRow};
 use static_cell::StaticCell;
+
+/// Cycles of a control period.
+const PERIOD_CYCLES: u32 = clocks::CORE_HZ / board::TICK_HZ;
+/// Shortest and longest distance of two ticks that is still a period: a quarter less or more. A tick comes late by what
+/// masks or outranks it, microseconds; what is a quarter of a period off is not the next period's tick.
+const SHORTEST: u32 = PERIOD_CYCLES / 4 * 3;
+const LONGEST: u32 = PERIOD_CYCLES / 4 * 5;
 
 /// What a thread asks of the tick. One order is taken a tick, and answered.
 pub enum Order {
@@ -74,6 +88,10 @@ struct Tick {
     /// The tick of this period has run.
     ran: bool,
     late: bool,
+    /// Period in which the encoders of the last tick were latched.
+    period: u32,
+    /// Cycle counter at the begin of the last tick that a scan started; none after one that no scan started.
+    started: Option<u32>,
     every_ticks: u16,
     until_row: u16,
     until_health: u16,
@@ -88,9 +106,11 @@ struct Tick {
 
 struct TickCell(UnsafeCell<MaybeUninit<Tick>>);
 
-// SAFETY: `start` fills the cell before it enables the two interrupts. After that only they use it, and as
-// they have the same priority neither interrupts the other.
-unsafe impl Sync for TickCell {}
+// SAFETY: the cell is shared by `start` in a thread and by the handlers of two interrupts. `start` passes once only
+// (its `StaticCell`s panic the second time) and writes the cell while both interrupts are still disabled in the NVIC.
+// From then on only the two handlers use it (`the_tick`), and as they have the same priority neither can begin while the
+// other runs. `Tick` itself is `Send`: it is made in a thread and used in the handlers.
+unsafe impl Sync for TickCell where Tick: Send {}
 
 static TICK: TickCell = TickCell(UnsafeCell::new(MaybeUninit::uninit()));
 static NOW: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
@@ -138,6 +158,8 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
         feeder: Feeder::default(),
         ran: true,
         late: false,
+        period: 0,
+        started: None,
         every_ticks: 0,
         until_row: 0,
         until_health: HEALTH_TICKS,
@@ -177,6 +199,10 @@ fn DMA1_STREAM7() {
     board::TICK_PULSE.drive(true);
     // SAFETY: this is one of the two interrupts.
     let tick = unsafe { the_tick() };
+    if adc_scan::take_period() {
+        // Interrupts were masked when the period began: its own interrupt still waits, behind this one.
+        NVIC::unpend(Interrupt::TIM6_DAC);
+    }
     tick.ran = true;
     tick.run(Some(adc_scan::take()));
     board::TICK_PULSE.drive(false);
@@ -184,11 +210,14 @@ fn DMA1_STREAM7() {
 
 #[interrupt]
 fn TIM6_DAC() {
-    adc_scan::acknowledge_period();
+    if !adc_scan::take_period() {
+        return;
+    }
     // SAFETY: this is the other of the two interrupts.
     let tick = unsafe { the_tick() };
     if !core::mem::take(&mut tick.ran) {
         board::TICK_PULSE.drive(true);
+        adc_scan::missed();
         tick.missed_scans = tick.missed_scans.saturating_add(1);
         tick.run(None);
         board::TICK_PULSE.drive(false);
@@ -199,9 +228,18 @@ impl Tick {
     #[inline(always)]
     fn run(&mut self, scan: Option<adc_scan::Scan>) {
         let started = DWT::cycle_count();
+        let since = self.started.replace(started).map(|before| started.wrapping_sub(before));
+        if scan.is_none() {
+            self.started = None;
+        }
+        let latched = encoders::latched();
+        let periods = latched.period.wrapping_sub(self.period) % M2_LATCHES as u32;
+        self.period = latched.period;
         let mut samples = Samples {
-            m1_count: encoders::m1_count(),
-            m2_count: encoders::m2_count(),
+            m1_count: latched.m1_count,
+            m2_count: latched.m2_count,
+            counts_irregular: periods != 1,
+            tick_irregular: since.is_some_and(|cycles| cycles.wrapping_sub(SHORTEST) > LONGEST - SHORTEST),
             adc_fresh: scan.is_some_and(|scan| !scan.overrun),
             adc_overrun: scan.is_some_and(|scan| scan.overrun),
             adc: scan.map_or_else(adc_scan::codes, |scan| scan.codes),

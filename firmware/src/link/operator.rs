@@ -111,11 +111,7 @@ impl Operator {
             Command::CaptureRead { offset } => read_capture(offset),
             Command::KeptMessage => Answer::Kept(self.identity.kept.clone()),
             Command::SelfCheck { case, steps } => self_check(case, steps),
-            Command::Restart
-                if tick::mode() == Mode::Running.number() || tick::mode() == Mode::Stopping.number() =>
-            {
-                Answer::Rejected(Rejection::NotDisabled)
-            }
+            Command::Restart if !drives_off() => Answer::Rejected(Rejection::NotDisabled),
             Command::Restart => restart::by_command(),
         }
     }
@@ -206,7 +202,12 @@ impl Operator {
         }
     }
 
+    /// Storing may erase a sector, which takes up to 4 s (DS12110, flash memory programming), and no request is heard
+    /// meanwhile: only with the drives off.
     async fn set_model(&mut self, model: Option<ModelRecord>) -> Answer {
+        if !drives_off() {
+            return Answer::Rejected(Rejection::NotDisabled);
+        }
         let prepared = match self.settings.with_model(model.as_ref()) {
             Ok(prepared) => prepared,
             Err(error) => return out_of_range(&error),

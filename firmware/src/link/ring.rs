@@ -10,6 +10,7 @@
 
 use super::LINE_ERRORS;
 use crate::memory::{RECEIVED, RECEIVED_BYTES};
+use crate::watchdog::{self, Thread};
 use core::sync::atomic::Ordering::{Acquire, Relaxed};
 use core::sync::atomic::fence;
 use embassy_stm32::mode::Async;
@@ -50,6 +51,9 @@ impl Ring {
             w.set_psize(Size::BITS8);
             w.set_msize(Size::BITS8);
             w.set_pl(Pl::HIGH);
+            // Without it a stream that serves a USART can lock up for good when another stream of the controller
+            // transfers at the same time (ES0392 rev 15, 2.20.4). The driver sets it on the sender's stream.
+            w.set_trbuff(true);
             w.set_en(true);
         });
         USART3.cr3().modify(|w| w.set_dmar(true));
@@ -59,6 +63,7 @@ impl Ring {
     /// Waits for bytes; gives how many of `bytes` were filled.
     pub async fn read(&mut self, bytes: &mut [u8]) -> usize {
         loop {
+            watchdog::alive(Thread::Receiver);
             count_errors();
             let written = RECEIVED_BYTES - usize::from(DMA1.st(STREAM).ndtr().read().ndt());
             // The bytes are read after the counter that says they are there.

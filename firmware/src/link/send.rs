@@ -1,6 +1,7 @@
 //! Messages to frames, frames to the DMA.
 
 use super::{FRAMES_REJECTED, LINE_ERRORS, OUTGOING};
+use crate::watchdog::{self, Thread};
 use core::sync::atomic::Ordering::Relaxed;
 use embassy_futures::select::select;
 use embassy_stm32::mode::Async;
@@ -23,6 +24,7 @@ pub async fn send(
     mut health: Consumer<'static, Health>,
 ) {
     loop {
+        watchdog::alive(Thread::Sender);
         let length = gather(buffer, &mut rows, &mut health);
         if length == 0 {
             select(Timer::after(GATHER), OUTGOING.ready_to_receive()).await;

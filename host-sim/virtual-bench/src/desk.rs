@@ -28,6 +28,7 @@ pub(crate) enum Question {
     Outputs,
     WrongPins,
     Memory { address: u64, length: u64 },
+    Register(u64),
     Snapshot,
     TakeLog,
 }
@@ -41,6 +42,7 @@ pub(crate) enum ToDesk {
     WrongPins(Vec<String>),
     Memory(Vec<u8>),
     Log(Vec<Vec<u8>>),
+    Register(u64),
     Done(Result<(), String>),
 }
 
@@ -185,6 +187,17 @@ impl Desk {
     pub fn take_log(&mut self) -> Result<Vec<Vec<u8>>, BenchError> {
         match self.ask(Question::TakeLog)? {
             ToDesk::Log(starts) => Ok(starts),
+            _ => Err(over()),
+        }
+    }
+
+    /// A peripheral's register, as a debugger reads it.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn register(&mut self, address: u64) -> Result<u64, BenchError> {
+        match self.ask(Question::Register(address))? {
+            ToDesk::Register(value) => Ok(value),
             _ => Err(over()),
         }
     }

@@ -11,9 +11,11 @@ use crate::elf::Firmware;
 use crate::meter::{Meter, Moment};
 use crate::outside::{Action, DriveInputs, Outside, PlantSide, Sensors};
 use crate::part::Part;
+use crate::part::adc_trigger::REFERENCE_MICROVOLT;
+use crate::part::encoder_timer::Disturbance;
 use crate::record::{Record, Saved};
 use crate::rtt::Rtt;
-use crate::{board::RigBoard, pins, serial};
+use crate::{board::RigBoard, interference, pins, serial};
 use rigless::device::ResetCause;
 use rigless::emulator::{AccessKind, Driver, HitKind, Host, Settled, Stop};
 use rigless::mcu::Mcu;
@@ -25,6 +27,8 @@ use rigless::time::VirtualNanos;
 
 /// The control period, ns.
 pub const PERIOD: u64 = 100_000;
+/// Interrupt of the link's DMA, DMA1 stream 0 (RM0433 table 147).
+const LOW_LINE: u64 = 11;
 /// A branch to itself, Thumb.
 const ENDLESS_LOOP: u64 = 0xE7FE;
 /// `udf #0`: for ever undefined.
@@ -131,7 +135,7 @@ impl BenchDriver {
 
     /// Switches and drives to their pins, voltages to their inputs.
     fn show_outside(&self, part: &mut Part, at: VirtualNanos) {
-        let Outside { arm_switch, stop_pressed, healthy, held_microvolt } = &self.outside;
+        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, .. } = &self.outside;
         pins::drive(part, at, pins::ARM_SWITCH, *arm_switch);
         pins::drive(part, at, pins::STOP_RELEASED, !stop_pressed);
         for (place, healthy) in pins::DRIVE_HEALTHY.into_iter().zip(healthy) {
@@ -152,12 +156,20 @@ impl BenchDriver {
 
     fn note_outputs(&mut self, part: &mut Part, at: VirtualNanos) {
         let outputs = Self::outputs(part, at);
+        // The converter's inputs at the DAC's own pins.
+        for (code, channel) in outputs.dac.into_iter().zip(pins::DAC_CHANNELS) {
+            let microvolt = u64::from(code.unwrap_or_default()) * u64::from(REFERENCE_MICROVOLT) / 4096;
+            part.adc1.set_input(channel, u32::try_from(microvolt).unwrap_or_default());
+        }
         self.record.note_outputs(at.0, outputs);
     }
 
     /// One period of the plant, and its edges into the encoders' timers.
     fn step_plant(&mut self, part: &mut Part, at: VirtualNanos) {
-        let inputs = Self::outputs(part, at);
+        let mut inputs = Self::outputs(part, at);
+        for (code, wire) in inputs.dac.iter_mut().zip(self.outside.references) {
+            *code = wire.pass(*code);
+        }
         let encoders = &mut part.encoders;
         self.sensors = self.plant.step(at, &inputs, &mut |motor, edge| encoders[motor as usize].push(edge));
     }
@@ -174,6 +186,21 @@ impl BenchDriver {
                 }
             }
             Action::EncoderLine(motor, line, level) => part.encoders[motor as usize].stick(line, level),
+            Action::EncoderSwapped(motor, swapped) => part.encoders[motor as usize].swap(swapped),
+            Action::EncoderDisturbed(motor, width_ns) => {
+                part.encoders[motor as usize].disturb(Disturbance { at: stop.at, width_ns });
+            }
+            Action::Reference(motor, wire) => self.outside.references[motor as usize] = wire,
+            Action::AdcScanCut => part.adc1.cut_next_scan(),
+            Action::SerialStreamsLockUp => {
+                interference::lock_up_serial_streams(part, stop.at);
+            }
+            Action::MaskInterrupts { times, from_ns, for_ns } => {
+                let stub =
+                    interference::masking_stub(host, self.addresses.low_handler, times, from_ns, for_ns);
+                // Flash, which the bench may program as the models do.
+                let _ = host.program(interference::vector(LOW_LINE), Width::W32, stub);
+            }
             Action::AdcStalled(stalled) => part.adc1.stall(stalled),
             Action::LinkSilent(silent) => serial::silence(part, silent),
             Action::LinkGarbled(per_million) => serial::garble(part, per_million, 1),
@@ -300,6 +327,7 @@ impl BenchDriver {
                 self.record.outputs.clear();
                 ToDesk::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
             }
+            Question::Register(address) => ToDesk::Register(interference::read(part, stop.at, address)),
             Question::Snapshot => {
                 let taken = snapshot::take(session, host, stop, &self.addresses.digest, &NothingMore);
                 ToDesk::Done(taken.map_err(|error| error.to_string()).map(|taken| {

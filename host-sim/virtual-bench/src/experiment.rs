@@ -314,6 +314,12 @@ pub struct ArmSwitch {
 }
 
 impl ArmSwitch {
+    /// Whether it was turned on.
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        self.on
+    }
+
     /// To be called again and again until the rig arms.
     ///
     /// # Errors

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
-const BINARY: &str = "rig-firmware";
+/// The firmware.
+pub const FIRMWARE: &str = "rig-firmware";
+/// All checks of the board in a row.
+pub const SELF_TEST: &str = "rig-self-test";
 
 /// The project's root: this package lies in host-sim/virtual-bench.
 #[must_use]
@@ -19,6 +22,14 @@ pub fn root() -> PathBuf {
 /// # Errors
 /// The target's core library cannot be had, or the firmware does not build.
 pub fn release_elf() -> Result<PathBuf, BenchError> {
+    release_elf_of(FIRMWARE)
+}
+
+/// The same for one of the binaries.
+///
+/// # Errors
+/// As [`release_elf`].
+pub fn release_elf_of(binary: &str) -> Result<PathBuf, BenchError> {
     let folder = root().join("firmware");
     if !core_library_is_there(&folder) {
         eprintln!("virtual-bench: rustup target add {TARGET}");
@@ -34,7 +45,7 @@ pub fn release_elf() -> Result<PathBuf, BenchError> {
         }
     }
     let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    build.args(["build", "--release", "--bin", BINARY, "--message-format", "json-render-diagnostics"]);
+    build.args(["build", "--release", "--bin", binary, "--message-format", "json-render-diagnostics"]);
     build.current_dir(&folder).stderr(Stdio::inherit());
     let output =
         build.output().map_err(|error| BenchError::Firmware(format!("cargo does not start: {error}")))?;
@@ -44,7 +55,7 @@ pub fn release_elf() -> Result<PathBuf, BenchError> {
     String::from_utf8_lossy(&output.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|message| message["target"]["name"] == BINARY)
+        .filter(|message| message["target"]["name"] == binary)
         .find_map(|message| message["executable"].as_str().map(PathBuf::from))
         .ok_or_else(|| BenchError::Firmware("cargo built it and named no executable".to_owned()))
 }

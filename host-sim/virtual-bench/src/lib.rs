@@ -15,6 +15,7 @@ pub mod experiment;
 pub mod firmware_build;
 mod full_rate;
 pub mod gaps;
+mod interference;
 pub mod meter;
 pub mod outside;
 pub mod part;

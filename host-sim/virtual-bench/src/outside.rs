@@ -54,10 +54,29 @@ pub enum Action {
     DriveHealthy(Motor, bool),
     /// A line of an encoder sticks at a level, or is free again.
     EncoderLine(Motor, Line, Option<bool>),
+    /// A and B of an encoder are swapped, or right again.
+    EncoderSwapped(Motor, bool),
+    /// Pulses of this width, in ns, are coupled into both lines of an encoder.
+    EncoderDisturbed(Motor, u64),
+    /// The wire of a torque reference between amplifier and drive.
+    Reference(Motor, ReferenceWire),
     /// An analogue input is held at a voltage in µV whatever the plant says, or is free again.
     AnalogueInput(usize, Option<u32>),
     /// The converter starts no more scans, or does again.
     AdcStalled(bool),
+    /// The next scan ends before its last channel.
+    AdcScanCut,
+    /// The serial port's DMA streams lock up where the errata sheet's condition for it holds.
+    SerialStreamsLockUp,
+    /// The next so many times the link's interrupt comes, all interrupts are masked.
+    MaskInterrupts {
+        /// How often.
+        times: u32,
+        /// From here in the control period, ns.
+        from_ns: u64,
+        /// For so long, ns.
+        for_ns: u64,
+    },
     /// The serial line is cut, or whole again.
     LinkSilent(bool),
     /// So many bytes in a million reach the chip with a framing error and flipped bits.
@@ -76,6 +95,45 @@ pub enum Action {
     HangThreads,
 }
 
+/// The ±10 V wire from the amplifier to a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ReferenceWire {
+    /// What is asked for arrives.
+    #[default]
+    Whole,
+    /// It is open, and the drive's input floats to one end.
+    Open,
+    /// The two cores are swapped.
+    Reversed,
+    /// So much of it arrives: amplifier or drive has another gain.
+    Scaled(f64),
+    /// The drive holds this code whatever is asked for.
+    Held(u16),
+}
+
+impl ReferenceWire {
+    /// What the drive gets of this code.
+    #[must_use]
+    pub fn pass(self, code: Option<u16>) -> Option<u16> {
+        let scaled = |by: f64| {
+            code.map(|code| {
+                let centred = f64::from(code) - 2048.0;
+                // The cast saturates, as the amplifier does.
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let passed = (2048.0 + by * centred).round() as u16;
+                passed.min(4095)
+            })
+        };
+        match self {
+            Self::Whole => code,
+            Self::Open => None,
+            Self::Reversed => scaled(-1.0),
+            Self::Scaled(by) => scaled(by),
+            Self::Held(code) => Some(code),
+        }
+    }
+}
+
 /// Switches, faults in wires, and what the plant shows: everything of the outside that lasts.
 #[derive(Debug, Clone)]
 pub struct Outside {
@@ -87,10 +145,18 @@ pub struct Outside {
     pub healthy: [bool; 2],
     /// Voltages that hide the plant's.
     pub held_microvolt: [Option<u32>; 5],
+    /// Wires of the torque references.
+    pub references: [ReferenceWire; 2],
 }
 
 impl Default for Outside {
     fn default() -> Self {
-        Self { arm_switch: false, stop_pressed: false, healthy: [true; 2], held_microvolt: [None; 5] }
+        Self {
+            arm_switch: false,
+            stop_pressed: false,
+            healthy: [true; 2],
+            held_microvolt: [None; 5],
+            references: Default::default(),
+        }
     }
 }

@@ -54,6 +54,9 @@ pub const LAMPS: [Place; 3] = [Place::new('B', 0), Place::new('E', 1), Place::ne
 /// The analogue inputs, in the order of the scan, by ADC1 channel.
 pub const ADC_CHANNELS: [u8; 5] = [10, 15, 5, 3, 16];
 
+/// ADC1's channels at the pins of the DAC's outputs.
+pub const DAC_CHANNELS: [u8; 2] = [18, 19];
+
 /// What a pin must be set up as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Use {

@@ -229,6 +229,10 @@ settings! {
 
     340: observer.bridge_lowpass_hz, "Hz";
     341: observer.residual_time_s, "s";
+
+    360: torque_watch.offset_tolerance_nm, "N m";
+    361: torque_watch.gain_tolerance;
+    362: torque_watch.lag_tolerance;
 }
 
 /// The setting with this key.

@@ -1,9 +1,11 @@
 //! The prepared configuration: settings turned into coefficients per tick.
 
 use super::bridge::{Bridge, Tare};
+use super::caps::RawCaps;
 use super::encoder::Encoder;
 use super::encoder_watch::{FreeWatch, SprungWatch};
 use super::guard::Guard;
+use super::inputs::PERMISSION_S;
 use super::m1::M1;
 use super::m2::M2;
 use super::observer::{Observer, ObserverModel};
@@ -11,6 +13,7 @@ use super::outputs::{DAC_MAX, DAC_ZERO};
 use super::settings::{ControlSettings, DriveSettings};
 use super::speed::SpeedEstimator;
 use super::supervisor::Timing;
+use super::torque_watch::TorqueWatch;
 use super::validate::validate;
 use crate::error::ParameterError;
 
@@ -33,6 +36,8 @@ pub struct ControlConfig {
     pub(crate) m2_dac: Dac,
     pub(crate) m1_watch: SprungWatch,
     pub(crate) m2_watch: FreeWatch,
+    pub(crate) m1_torque_watch: TorqueWatch,
+    pub(crate) m2_torque_watch: TorqueWatch,
     pub(crate) guard: Guard,
     pub(crate) timing: Timing,
     pub(crate) observer: Observer,
@@ -44,7 +49,16 @@ impl ControlSettings {
     /// # Errors
     /// The first setting outside its range, with the range.
     pub fn build(&self) -> Result<ControlConfig, ParameterError> {
+        self.build_within(&RawCaps::FULL_SCALE)
+    }
+
+    /// The same for a board with caps of its own.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; or a limit lies beyond a cap of the board.
+    pub fn build_within(&self, caps: &RawCaps) -> Result<ControlConfig, ParameterError> {
         validate(self)?;
+        caps.check(self)?;
         let dt = self.tick_s;
         let ticks = |time_s: f32| (time_s / dt) as u32;
         let w = &self.encoder_watch;
@@ -66,15 +80,18 @@ impl ControlSettings {
             tare: Tare::new(self),
             m1: M1::new(self),
             m2: M2::new(self),
-            m1_dac: Dac::new(&self.m1),
-            m2_dac: Dac::new(&self.m2),
+            m1_dac: Dac::new(&self.m1, caps.dac_codes[0]),
+            m2_dac: Dac::new(&self.m2, caps.dac_codes[1]),
             m1_watch: SprungWatch::new(self, m1_encoder.rad_per_count()),
             m2_watch: FreeWatch::new(self),
+            m1_torque_watch: TorqueWatch::new(&self.m1, &self.torque_watch, dt),
+            m2_torque_watch: TorqueWatch::new(&self.m2, &self.torque_watch, dt),
             guard: Guard::new(self),
             timing: Timing {
                 boot_ticks: ticks(self.timing.boot_s),
                 stop_ticks: ticks(self.timing.stop_timeout_s),
                 rest_ticks: ticks(REST_TIME_S),
+                permission_ticks: ticks(PERMISSION_S).max(1),
             },
             observer: Observer::new(&self.observer, self.geometry.friction_radius_m, dt)?,
         })
@@ -98,12 +115,27 @@ impl ControlConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Dac {
     codes_per_nm: f32,
+    nm_per_code: f32,
+    lowest: u16,
+    highest: u16,
 }
 
 impl Dac {
-    fn new(drive: &DriveSettings) -> Self {
-        let codes_per_nm = f32::from(DAC_ZERO) / drive.rated_torque_nm;
-        Self { codes_per_nm: if drive.reversed { -codes_per_nm } else { codes_per_nm } }
+    /// With codes no further than `reach` from zero.
+    fn new(drive: &DriveSettings, reach: u16) -> Self {
+        let rated_torque_nm = if drive.reversed { -drive.rated_torque_nm } else { drive.rated_torque_nm };
+        let codes = f32::from(DAC_ZERO);
+        Self {
+            codes_per_nm: codes / rated_torque_nm,
+            nm_per_code: rated_torque_nm / codes,
+            lowest: DAC_ZERO.saturating_sub(reach),
+            highest: DAC_ZERO.saturating_add(reach).min(DAC_MAX),
+        }
+    }
+
+    /// The torque a code asks for.
+    pub(crate) fn torque_nm(&self, code: u16) -> f32 {
+        (f32::from(code) - f32::from(DAC_ZERO)) * self.nm_per_code
     }
 
     /// The nearest code; what is no number is zero torque.
@@ -113,7 +145,7 @@ impl Dac {
             return DAC_ZERO;
         }
         // `as` rounds towards zero and saturates at both ends.
-        (code as u16).min(DAC_MAX)
+        (code as u16).min(self.highest).max(self.lowest)
     }
 }
 
@@ -123,20 +155,24 @@ mod tests {
 
     #[test]
     fn the_dac_has_its_zero_at_mid_scale_and_its_ends_at_the_rated_torque() {
-        let plain = Dac::new(&ControlSettings::default().m1);
-        let turned = Dac::new(&DriveSettings { reversed: true, ..ControlSettings::default().m1 });
+        let plain = Dac::new(&ControlSettings::default().m1, DAC_ZERO);
+        let turned = Dac::new(&DriveSettings { reversed: true, ..ControlSettings::default().m1 }, DAC_ZERO);
         for (torque_nm, code) in
             [(0.0, 2048), (4.0, 3072), (-4.0, 1024), (8.0, 4095), (-8.0, 0), (1e9, 4095), (-1e9, 0)]
         {
             assert_eq!(plain.code(torque_nm), code, "{torque_nm}");
         }
         assert_eq!((turned.code(4.0), turned.code(-4.0)), (1024, 3072));
+        assert_eq!(
+            (plain.torque_nm(3072), turned.torque_nm(3072), plain.torque_nm(DAC_ZERO)),
+            (4.0, -4.0, 0.0)
+        );
         // Half a step of 3.9 mN·m rounds to the nearest code.
         assert_eq!(
             (plain.code(0.0019), plain.code(0.0020), plain.code(-0.0019), plain.code(-0.0021)),
             (2048, 2049, 2048, 2047)
         );
         assert_eq!(plain.code(f32::NAN), DAC_ZERO);
-        assert_eq!(Dac { codes_per_nm: f32::INFINITY }.code(0.0), DAC_ZERO);
+        assert_eq!(Dac { codes_per_nm: f32::INFINITY, ..plain }.code(0.0), DAC_ZERO);
     }
 }

@@ -14,8 +14,9 @@ use super::settings::EncoderSettings;
 use core::f32::consts::TAU;
 use fixed::types::{I32F32, U0F64};
 
-/// Counts that sampling may add to or take from a step: one at each end, one for the instant of sampling.
-const SAMPLING_COUNTS: f32 = 3.0;
+/// How far the instant at which a counter is latched may be from the begin of its period: the arbitration of the DMA
+/// that does it, some ten cycles of its bus.
+const LATCH_JITTER_S: f32 = 1e-7;
 
 /// Coefficients of one encoder.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,15 +59,19 @@ impl Encoder {
         tick_s: f32,
     ) -> Self {
         let counts_per_rad = settings.counts_per_rev as f32 / TAU;
+        let jitter_counts = LATCH_JITTER_S * max_speed_rad_s * counts_per_rad;
         Self {
             unused_bits: 32 - settings.counter_bits.clamp(1, 32),
             reversed: settings.reversed,
             counts_per_rev: i32::try_from(settings.counts_per_rev).unwrap_or(i32::MAX),
             turns_per_count: U0F64::from_bits(u64::MAX / u64::from(settings.counts_per_rev.max(1))),
             rad_per_count: 1.0 / counts_per_rad,
-            most_counts: (max_speed_rad_s * tick_s * counts_per_rad + SAMPLING_COUNTS) as i32,
-            most_change: (max_acceleration_rad_s2 * tick_s * tick_s * counts_per_rad + SAMPLING_COUNTS)
-                as i32,
+            // A position is cut to whole counts: below one count of error, so below one in a step and below two in a
+            // change of step. The jitter of two instants is in a step, that of three, the middle one twice, in a change.
+            most_counts: (max_speed_rad_s * tick_s * counts_per_rad + 1.0 + 2.0 * jitter_counts) as i32,
+            most_change: (max_acceleration_rad_s2 * tick_s * tick_s * counts_per_rad
+                + 2.0
+                + 4.0 * jitter_counts) as i32,
         }
     }
 
@@ -262,7 +267,7 @@ mod tests {
 
     #[test]
     fn speed_beyond_the_possible_is_a_jump_however_it_is_reached() {
-        // 60 rad/s are 458 counts a tick, and 3 for sampling.
+        // 60 rad/s are 458.4 counts a tick, 1 for whole counts and 0.9 for the instants of latching.
         let (encoder, mut state) = (encoder(32), EncoderState::default());
         let mut raw = 0_u32;
         encoder.step(&mut state, raw, true);
@@ -270,6 +275,6 @@ mod tests {
             raw = raw.wrapping_add(*step);
             encoder.step(&mut state, raw, true).jump
         });
-        assert_eq!(first, Some(462));
+        assert_eq!(first, Some(461));
     }
 }

@@ -29,11 +29,14 @@ numbered! {
         M1OverTorque = 25, "The torque of M1 is larger than allowed.";
         M2OverTorque = 26, "The torque of M2 is larger than allowed.";
         OverForce = 27, "The normal force is larger than allowed.";
+        M1TorqueMismatch = 28, "The torque of M1 is not what its drive was asked for.";
+        M2TorqueMismatch = 29, "The torque of M2 is not what its drive was asked for.";
         SupplyLow = 32, "The supply voltage is too low.";
         SupplyHigh = 33, "The supply voltage is too high.";
         DeadlineBudget = 36, "Too many control ticks ended late.";
-        LinkLost = 37, "The host was not heard while an experiment ran.";
+        LinkLost = 37, "The host was not heard while the drives were on.";
         CalculationInvalid = 38, "A control value was not a finite number.";
+        TickIrregular = 39, "Control ticks did not come a period apart.";
         SettingsCorrupt = 40, "The stored settings are damaged.";
         WatchdogReset = 41, "The watchdog restarted the controller.";
         Panic = 42, "The firmware stopped itself and restarted; its message is kept.";

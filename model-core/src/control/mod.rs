@@ -5,6 +5,7 @@
 //! no division by constants, no logging: what happened goes into a small queue of events ([`event`]).
 
 mod bridge;
+pub mod caps;
 #[cfg(test)]
 mod closed_loop_tests;
 pub mod command;
@@ -17,6 +18,7 @@ pub mod fault;
 #[cfg(test)]
 mod fault_tests;
 mod guard;
+mod inputs;
 pub mod limit;
 mod m1;
 mod m2;
@@ -24,6 +26,8 @@ mod numbered;
 pub mod observer;
 pub mod outputs;
 mod pi;
+#[cfg(test)]
+mod random_tests;
 mod reference;
 pub mod samples;
 pub mod sequencer;
@@ -38,10 +42,12 @@ mod supervisor_tests;
 mod testbench;
 pub mod tick;
 mod torque_loop;
+mod torque_watch;
 pub mod validate;
 #[cfg(test)]
 mod validate_tests;
 
+pub use caps::RawCaps;
 pub use command::{Command, Refusal, Refused};
 pub use config::ControlConfig;
 pub use event::{Event, EventKind, Reason};

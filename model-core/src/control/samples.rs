@@ -3,10 +3,15 @@
 /// Everything sampled for one tick. Raw codes and levels; scaling belongs to the core.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Samples {
-    /// Quadrature counter of M1; wraps at the width given in the settings.
+    /// Quadrature counter of M1 at the begin of the period; wraps at the width given in the settings.
     pub m1_count: u32,
-    /// Quadrature counter of M2.
+    /// Quadrature counter of M2 at the same instant.
     pub m2_count: u32,
+    /// The counters' instant and that of the previous tick are not one control period apart: the readings are those of
+    /// before, or a period had no tick of its own.
+    pub counts_irregular: bool,
+    /// The time since the previous tick is no control period.
+    pub tick_irregular: bool,
     /// The last complete scan of the analogue inputs.
     pub adc: AdcScan,
     /// The scan is newer than the one of the previous tick.

@@ -39,6 +39,8 @@ pub struct ControlSettings {
     pub limits: LimitSettings,
     /// Watch over encoders.
     pub encoder_watch: EncoderWatchSettings,
+    /// Watch over the torques of both drives.
+    pub torque_watch: TorqueWatchSettings,
     /// Time limits.
     pub timing: TimingSettings,
     /// Model observer.
@@ -187,6 +189,17 @@ pub struct EncoderWatchSettings {
     pub window_s: f32,
 }
 
+/// Watch over the torques: how far what a drive gives may be from what it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TorqueWatchSettings {
+    /// Offsets of drive and monitor together.
+    pub offset_tolerance_nm: f32,
+    /// Gain errors of drive and monitor together, as a share of the torque.
+    pub gain_tolerance: f32,
+    /// How well the drive's lag is known, as a share of it.
+    pub lag_tolerance: f32,
+}
+
 /// Time limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimingSettings {
@@ -273,6 +286,12 @@ impl Default for ControlSettings {
                 m2_free_speed_rad_s: 1.0,
                 m1_free_angle_rad: 0.02,
                 window_s: 0.02,
+            },
+            // 2 % of the monitor's 20 N·m, and 10 %, as much as the trim may have to make up for at rated torque.
+            torque_watch: TorqueWatchSettings {
+                offset_tolerance_nm: 0.4,
+                gain_tolerance: 0.1,
+                lag_tolerance: 0.2,
             },
             timing: TimingSettings {
                 boot_s: 0.1,

@@ -83,6 +83,8 @@ pub(crate) struct Timing {
     pub(crate) boot_ticks: u32,
     pub(crate) stop_ticks: u32,
     pub(crate) rest_ticks: u32,
+    /// A line permits after so many ticks (`inputs.rs`), and the arm switch counts as released after as many.
+    pub(crate) permission_ticks: u32,
 }
 
 /// What the supervisor remembers.
@@ -98,13 +100,18 @@ pub(crate) struct Supervisor {
     causes: FaultSet,
     arm_switch: bool,
     switch_released: bool,
+    /// Ticks in a row with the switch off.
+    ticks_off: u32,
 }
 
 /// What the supervisor looks at in one tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Watch {
     pub(crate) causes: FaultSet,
+    /// On, without its bounces.
     pub(crate) arm_switch: bool,
+    /// It reads off in this tick.
+    pub(crate) arm_switch_off: bool,
     pub(crate) at_rest: bool,
 }
 
@@ -125,6 +132,7 @@ impl Supervisor {
             causes: FaultSet::EMPTY,
             arm_switch: false,
             switch_released: false,
+            ticks_off: 0,
         }
     }
 
@@ -134,7 +142,9 @@ impl Supervisor {
         self.ticks_at_rest = if watch.at_rest { self.ticks_at_rest.saturating_add(1) } else { 0 };
         self.causes = watch.causes;
         self.arm_switch = watch.arm_switch;
-        self.switch_released |= !watch.arm_switch;
+        // A bounce of a switch that is on is no release.
+        self.ticks_off = if watch.arm_switch_off { self.ticks_off.saturating_add(1) } else { 0 };
+        self.switch_released |= self.ticks_off >= timing.permission_ticks;
         match self.mode {
             Mode::Boot => {
                 if self.ticks_in_mode > timing.boot_ticks {
@@ -171,7 +181,7 @@ impl Supervisor {
         }
         self.first = self.first.or(new.first());
         self.latched = self.latched.union(new);
-        self.switch_released = false;
+        (self.switch_released, self.ticks_off) = (false, 0);
         for fault in new.iter() {
             events.push(tick, EventKind::FaultLatched(fault));
         }

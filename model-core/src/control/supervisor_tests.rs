@@ -76,14 +76,14 @@ fn disarming_takes_the_torque_away_in_the_next_tick() {
 #[test]
 fn a_disc_that_does_not_come_to_rest_is_left_without_torque() {
     let mut bench = Bench::new().running(&short());
-    // Something else turns the disc: the encoder goes on, and the torque monitor explains it.
+    // Something else turns the disc: the encoder goes on, and the ring's torque explains it.
     let mut count = 0_u32;
     bench.run(0.25);
     let last = bench.records[bench.records.len() - 1].m2_count as u32;
     bench.tamper = Some(Box::new(move |s| {
         count += 24;
         s.m2_count = last.wrapping_add(count);
-        s.adc.m2_torque = 32768 + 3000;
+        s.adc.friction_bridge = 2_800;
     }));
     bench.run(3.2);
     assert_eq!(transitions(&bench).last(), Some(&(Mode::Stopping, Mode::Disabled, Reason::StopTimeout)));
@@ -126,7 +126,7 @@ fn commands_that_do_not_fit_the_mode_are_refused_with_their_reason() {
     expect(&mut bench, Command::Stop, Refusal::NotRunning);
     expect(&mut bench, Command::ClearFault, Refusal::NoFault);
     bench.arm_switch = true;
-    bench.tick();
+    bench.run(0.01);
     bench.apply(Command::Arm).unwrap();
     expect(&mut bench, Command::Arm, Refusal::NotDisabled);
     expect(&mut bench, Command::Start, Refusal::NoExperiment);
@@ -147,7 +147,7 @@ fn commands_that_do_not_fit_the_mode_are_refused_with_their_reason() {
     expect(&mut bench, Command::Start, Refusal::FaultLatched);
     expect(&mut bench, Command::ClearFault, Refusal::CausePresent);
     bench.tamper = None;
-    bench.tick();
+    bench.run(0.01);
     bench.apply(Command::ClearFault).unwrap();
     bench.tick();
     expect(&mut bench, Command::Arm, Refusal::ArmSwitchNotReleased);

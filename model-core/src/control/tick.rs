@@ -15,6 +15,7 @@ use super::encoder_watch::{FreeWatchState, SprungWatchState};
 use super::event::{Event, EventKind, EventQueue};
 use super::fault::{Fault, FaultSet};
 use super::guard::{GuardState, Sight};
+use super::inputs::InputState;
 use super::limit::LimitSet;
 use super::m1::MotorCommand;
 use super::m2::{M2Measured, M2State};
@@ -25,6 +26,7 @@ use super::sequencer::{Demand, M2Mode, Sequencer, SequencerState};
 use super::speed::SpeedState;
 use super::supervisor::{Mode, Restart, Supervisor, Watch};
 use super::torque_loop::TorqueState;
+use super::torque_watch::TorqueWatchState;
 use crate::extension::ExtendedInput;
 
 /// Torque of M1 below which the contact counts as left alone, for a tare.
@@ -46,10 +48,12 @@ pub struct ControlState {
     events: EventQueue,
     limits_told: LimitSet,
     guard: GuardState,
+    inputs: InputState,
     measuring: MeasuringState,
     tare: TareState,
     m1: TorqueState,
     m2: M2State,
+    torque_watch: [TorqueWatchState; 2],
     observer: ObserverState,
 }
 
@@ -64,7 +68,7 @@ struct MeasuringState {
     m1_watch: SprungWatchState,
     m2_watch: FreeWatchState,
     at_rest: bool,
-    late: bool,
+    counts_irregular: bool,
 }
 
 /// Samples of one tick in SI units.
@@ -90,17 +94,15 @@ impl MeasuringState {
             m1_watch: SprungWatchState::default(),
             m2_watch: FreeWatchState::default(),
             at_rest: false,
-            late: false,
+            counts_irregular: false,
         }
     }
 
     fn step(&mut self, config: &ControlConfig, samples: &Samples) -> Measured {
         let (s, adc) = (&config.settings, &samples.adc);
-        // A tick that nothing or not its own scan started read the encoders late: the times to its neighbours are no
-        // period.
-        let late = samples.deadline_missed || !(samples.adc_fresh || samples.adc_overrun);
-        let was_late = core::mem::replace(&mut self.late, late);
-        let regular = !(late || was_late);
+        // The change of a step needs two regular ones in a row.
+        let was_irregular = core::mem::replace(&mut self.counts_irregular, samples.counts_irregular);
+        let regular = !(samples.counts_irregular || was_irregular);
         let m1 = config.m1_encoder.step(&mut self.m1_encoder, samples.m1_count, regular);
         let m2 = config.m2_encoder.step(&mut self.m2_encoder, samples.m2_count, regular);
         let m2_speed_rad_s = config.speed.step(&mut self.speed, m2.counts);
@@ -145,7 +147,9 @@ impl MeasuringState {
             m2_jump: m.m2_jump,
             m1_loss,
             m2_loss,
-            link_needed: mode.has_torque(),
+            m1_mismatch: false,
+            m2_mismatch: false,
+            link_needed: mode.is_live(),
         }
     }
 }
@@ -169,10 +173,12 @@ impl ControlState {
             events: EventQueue::default(),
             limits_told: LimitSet::EMPTY,
             guard: GuardState::default(),
+            inputs: InputState::new(config.timing.permission_ticks),
             measuring: MeasuringState::new(config),
             tare: TareState::default(),
             m1: TorqueState::default(),
             m2: M2State::default(),
+            torque_watch: Default::default(),
             observer: config.observer.fresh(),
         }
     }
@@ -392,10 +398,19 @@ fn carry_out(
 /// One control tick.
 pub fn step(config: &ControlConfig, state: &mut ControlState, samples: &Samples) -> Outputs {
     let m = state.measuring.step(config, samples);
-    let sight = state.measuring.sight(config, &m, state.supervisor.mode());
+    let lines = state.inputs.step(samples, config.timing.permission_ticks);
+    let mut sight = state.measuring.sight(config, &m, state.supervisor.mode());
+    if state.mode().is_live() {
+        let [m1, m2] = &mut state.torque_watch;
+        sight.m1_mismatch = config.m1_torque_watch.step(m1, m.m1_torque_nm);
+        sight.m2_mismatch = config.m2_torque_watch.step(m2, m.m2_torque_nm);
+    } else {
+        state.torque_watch = Default::default();
+    }
     let watch = Watch {
-        causes: config.guard.step(&mut state.guard, samples, &sight),
-        arm_switch: samples.arm_switch,
+        causes: config.guard.step(&mut state.guard, samples, &lines, &sight),
+        arm_switch: lines.arm_switch,
+        arm_switch_off: !samples.arm_switch,
         at_rest: state.measuring.at_rest,
     };
     state.supervisor.step(&config.timing, watch, state.tick, &mut state.events);
@@ -414,6 +429,9 @@ pub fn step(config: &ControlConfig, state: &mut ControlState, samples: &Samples)
         state.sequencer.stop();
     }
     let dac = [config.m1_dac.code(commands[0].command_nm), config.m2_dac.code(commands[1].command_nm)];
+    let [m1, m2] = &mut state.torque_watch;
+    m1.told(config.m1_dac.torque_nm(dac[0]));
+    m2.told(config.m2_dac.torque_nm(dac[1]));
     let record = state.record(config, &m, &commands, limits, &observed);
     let outputs = Outputs { dac, drive_enable: [mode.is_live(); 2], leds: state.leds(), record };
     state.tick = state.tick.wrapping_add(1);

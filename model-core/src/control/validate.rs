@@ -126,6 +126,9 @@ pub(crate) fn validate(s: &ControlSettings) -> Result<(), ParameterError> {
     within!(s.encoder_watch.m2_free_speed_rad_s, 0.01..=100.0, " rad/s");
     within!(s.encoder_watch.m1_free_angle_rad, 1e-4..=1.0, " rad");
     within!(s.encoder_watch.window_s, 0.001..=1.0, " s");
+    within!(s.torque_watch.offset_tolerance_nm, 0.01..=2.0, " N·m");
+    within!(s.torque_watch.gain_tolerance, 0.0..=0.5, "");
+    within!(s.torque_watch.lag_tolerance, 0.0..=1.0, "");
     within!(s.timing.boot_s, 0.0..=10.0, " s");
     relation!(s.timing.adc_stall_ticks, (1..=100).contains(&s.timing.adc_stall_ticks), "1 … 100");
     relation!(s.timing.adc_overrun_budget, s.timing.adc_overrun_budget <= 1000, "0 … 1000");

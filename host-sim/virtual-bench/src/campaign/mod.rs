@@ -8,9 +8,9 @@
 
 mod faults;
 mod link_noise;
-mod running;
 mod settings_cut;
-mod witness;
+pub mod states;
+pub mod witness;
 
 use crate::driver::PERIOD;
 use crate::elf::Firmware;
@@ -57,7 +57,7 @@ pub fn run(
         tell(&verdict);
         verdicts.push(verdict);
     };
-    let running = running::kept(firmware)?;
+    let running = states::State::Sliding.kept(firmware)?;
     for case in faults::all() {
         add(faults::verdict(firmware, &running, scratch, &case)?);
     }

@@ -4,7 +4,7 @@ use crate::desk::Desk;
 use crate::error::BenchError;
 use host_sim::link::client::Client;
 use rig_link::message::{Answer, Command, EventKind, EventMessage, Message};
-use rig_link::telemetry::Health;
+use rig_link::telemetry::{Health, TelemetryRow};
 
 /// Time between two signs of life: a fifth of the rig's patience.
 const ALIVE_NS: u64 = 100_000_000;
@@ -13,32 +13,46 @@ const PATIENCE_NS: u64 = 1_000_000_000;
 
 /// The host.
 #[derive(Debug)]
-pub(super) struct Witness {
+pub struct Witness {
     client: Client,
     alive_at: u64,
     /// Sends signs of life.
-    pub(super) lively: bool,
+    pub lively: bool,
     /// What happened, as the rig told it.
-    pub(super) events: Vec<EventMessage>,
+    pub events: Vec<EventMessage>,
     /// The last health record.
-    pub(super) health: Option<Health>,
+    pub health: Option<Health>,
+    /// The last row of telemetry.
+    pub row: Option<TelemetryRow>,
     answers: Vec<(u16, Answer)>,
 }
 
+impl Default for Witness {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Witness {
-    pub(super) fn new() -> Self {
+    /// A host that has heard nothing, and sends signs of life.
+    #[must_use]
+    pub fn new() -> Self {
         Self {
             client: Client::new(),
             alive_at: 0,
             lively: true,
             events: Vec::new(),
             health: None,
+            row: None,
             answers: Vec::new(),
         }
     }
 
     /// Listens until an instant.
-    pub(super) fn listen(&mut self, desk: &mut Desk, until_ns: u64) -> Result<(), BenchError> {
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn listen(&mut self, desk: &mut Desk, until_ns: u64) -> Result<(), BenchError> {
         while desk.now_ns() < until_ns {
             if self.lively && desk.now_ns() >= self.alive_at {
                 self.alive_at = desk.now_ns() + ALIVE_NS;
@@ -55,7 +69,7 @@ impl Witness {
                     Message::Event(event) => self.events.push(event),
                     Message::Health(health) => self.health = Some(health),
                     Message::Answer { id, answer } => self.answers.push((id, answer)),
-                    Message::Telemetry(_) => {}
+                    Message::Telemetry(row) => self.row = Some(row),
                 }
             }
         }
@@ -63,12 +77,15 @@ impl Witness {
     }
 
     /// Asks, and does not wait for the answer.
-    pub(super) fn send(&mut self, command: &Command) {
+    pub fn send(&mut self, command: &Command) {
         self.client.request(command.clone());
     }
 
     /// Asks, and waits for the answer; asks again where there is none.
-    pub(super) fn ask(&mut self, desk: &mut Desk, command: &Command) -> Result<Answer, BenchError> {
+    ///
+    /// # Errors
+    /// The run ended, or there was no answer.
+    pub fn ask(&mut self, desk: &mut Desk, command: &Command) -> Result<Answer, BenchError> {
         for _ in 0..3 {
             let id = self.client.request(command.clone());
             let until = desk.now_ns() + PATIENCE_NS;
@@ -83,7 +100,8 @@ impl Witness {
     }
 
     /// Whether the rig told of this fault.
-    pub(super) fn heard_of(&self, fault: u8) -> bool {
+    #[must_use]
+    pub fn heard_of(&self, fault: u8) -> bool {
         self.events.iter().any(|event| event.kind == EventKind::FaultLatched(fault))
     }
 }

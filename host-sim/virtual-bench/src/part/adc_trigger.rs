@@ -6,7 +6,7 @@
 //! | `EXTEN` 00: `ADSTART` starts the sequence at once; else it only arms, and an edge of the source `EXTSEL` names starts it | 25.4.18, 25.4.19 |
 //! | Armed, `ADSTART` stays set from sequence to sequence until `ADSTP` | 25.4.16, 25.4.18 |
 //! | An edge while a sequence runs is ignored | 25.4.19 |
-//! | `EXTEN` and `EXTSEL` change only while `ADSTART` is clear | 25.6.4 |
+//! | `CFGR`, `SMPRx`, `PCSEL` and `SQRx` are written only while `ADSTART` is clear; other writes are ignored here, and told | 25.6.4, 25.6.6 to 25.6.13 |
 //! | `ADDIS` acts only while `ADSTART` is clear | 25.4.9 |
 //!
 //! A trigger arrives as a write of `ISR` with the reserved bit 31 set and the source's number in bits 28:24:
@@ -35,7 +35,7 @@ const SOURCE_SHIFT: u32 = 24;
 const SOURCE: u64 = 0x1F << SOURCE_SHIFT;
 
 const CHANGED_WHILE_ARMED: &str =
-    "EXTEN and EXTSEL were written while ADSTART stands, so they stay as they are";
+    "configuration was written while ADSTART stands (RM0433 25.6), so it stays as it is";
 const DISABLED_WHILE_ARMED: &str = "ADDIS was written while ADSTART stands, so it does nothing";
 
 /// Full scale of the inputs in the unit of [`TriggeredAdc::set_input`].
@@ -49,6 +49,21 @@ pub(super) const fn trigger_word(source: u64) -> u64 {
     TRIGGER | source << SOURCE_SHIFT
 }
 
+/// Registers that change only while `ADSTART` is clear.
+const CONFIGURATION: [(Register, &str); 8] = [
+    (Register::Cfgr, "CFGR"),
+    (Register::Smpr1, "SMPR1"),
+    (Register::Smpr2, "SMPR2"),
+    (Register::Pcsel, "PCSEL"),
+    (Register::Sqr1, "SQR1"),
+    (Register::Sqr2, "SQR2"),
+    (Register::Sqr3, "SQR3"),
+    (Register::Sqr4, "SQR4"),
+];
+
+/// Conversions of a scan that is cut short.
+const CUT_AFTER: u32 = 3;
+
 /// ADC1 with its external trigger.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct TriggeredAdc {
@@ -59,6 +74,12 @@ pub struct TriggeredAdc {
     converting: bool,
     /// A fault of the bench: conversions no longer start.
     stalled: bool,
+    /// Configuration in force, in the order of [`CONFIGURATION`].
+    configured: [u64; CONFIGURATION.len()],
+    /// A fault of the bench: the next scan ends after some of its conversions.
+    cut: bool,
+    /// Conversions of the scan under way.
+    converted: u32,
     started: u64,
     ignored: u64,
 }
@@ -67,7 +88,18 @@ impl TriggeredAdc {
     pub(super) fn new() -> Self {
         let mut adc = Adc::new(Converter::Adc1, 0);
         adc.set_reference(REFERENCE_MICROVOLT);
-        Self { adc, external: 0, armed: false, converting: false, stalled: false, started: 0, ignored: 0 }
+        Self {
+            adc,
+            external: 0,
+            armed: false,
+            converting: false,
+            stalled: false,
+            configured: [0; CONFIGURATION.len()],
+            cut: false,
+            converted: 0,
+            started: 0,
+            ignored: 0,
+        }
     }
 
     /// The voltage at input `channel` from now on. The emulator's converter takes the ratio of input and
@@ -83,6 +115,11 @@ impl TriggeredAdc {
         self.stalled = stalled;
     }
 
+    /// The fault "a scan is cut short": the next one ends after [`CUT_AFTER`] conversions, without its end of sequence.
+    pub fn cut_next_scan(&mut self) {
+        self.cut = true;
+    }
+
     /// Sequences started by a trigger, and triggers ignored because a sequence ran.
     #[must_use]
     pub fn triggers(&self) -> (u64, u64) {
@@ -91,6 +128,8 @@ impl TriggeredAdc {
 
     fn disarm(&mut self) {
         self.external = 0;
+        self.configured = [0; CONFIGURATION.len()];
+        self.cut = false;
         self.armed = false;
         self.converting = false;
     }
@@ -110,6 +149,7 @@ impl TriggeredAdc {
             return;
         }
         self.started += 1;
+        self.converted = 0;
         let control = registers.get(Register::Cr) | ADSTART;
         registers.set(Register::Cr, control);
         self.adc.write(Register::Cr, control, registers, context);
@@ -139,16 +179,42 @@ impl TriggeredAdc {
         self.adc.write(Register::Cr, landed, registers, context);
     }
 
-    /// `CFGR`: the trigger fields are kept here, and the converter inside sees a software start.
-    fn write_configuration(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let landed = registers.get(Register::Cfgr);
+    /// Configuration: kept as it is while `ADSTART` stands. Of `CFGR` the trigger fields are kept here, and the converter
+    /// inside sees a software start.
+    fn write_configuration(
+        &mut self,
+        nth: usize,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let (register, name) = CONFIGURATION[nth];
+        let landed = registers.get(register);
         if !self.armed {
-            self.external = landed & EXTERNAL;
-        } else if landed & EXTERNAL != self.external {
-            context.tell("CFGR", CHANGED_WHILE_ARMED);
+            self.configured[nth] = landed;
+        } else if landed != self.configured[nth] {
+            context.tell(name, CHANGED_WHILE_ARMED);
         }
-        registers.set(Register::Cfgr, landed & !EXTERNAL);
-        self.adc.write(Register::Cfgr, landed & !EXTERNAL, registers, context);
+        let mut kept = self.configured[nth];
+        if register == Register::Cfgr {
+            self.external = kept & EXTERNAL;
+            kept &= !EXTERNAL;
+        }
+        registers.set(register, kept);
+        self.adc.write(register, kept, registers, context);
+    }
+
+    /// Ends the scan under way after some of its conversions, if that is asked for.
+    fn cut_scan(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if !(self.cut && self.armed && self.converting) {
+            return;
+        }
+        self.converted += 1;
+        if self.converted >= CUT_AFTER {
+            self.cut = false;
+            let control = registers.get(Register::Cr) | ADSTP;
+            registers.set(Register::Cr, control);
+            self.adc.write(Register::Cr, control, registers, context);
+        }
     }
 
     /// What a read adds to the value of the converter inside.
@@ -198,17 +264,20 @@ impl Device for TriggeredAdc {
     ) {
         match register {
             Register::Cr => self.write_control(registers, context),
-            Register::Cfgr => self.write_configuration(registers, context),
             Register::Isr if value & TRIGGER != 0 => {
                 self.trigger((value & SOURCE) >> SOURCE_SHIFT, registers, context);
             }
-            _ => self.adc.write(register, value, registers, context),
+            _ => match CONFIGURATION.iter().position(|(other, _)| *other == register) {
+                Some(nth) => self.write_configuration(nth, registers, context),
+                None => self.adc.write(register, value, registers, context),
+            },
         }
         self.follow(registers);
     }
 
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.adc.on_event(event, registers, context);
+        self.cut_scan(registers, context);
         self.follow(registers);
     }
 
@@ -371,6 +440,34 @@ mod tests {
         bench.advance(5 * PERIOD);
         assert!(!conversions(&mut bench));
         assert_eq!(bench.part.adc1.triggers(), (0, 0));
+    }
+
+    #[test]
+    fn configuration_stays_as_it_is_while_adstart_stands_and_the_write_is_told() {
+        let mut bench = enabled(TIM6_RISING);
+        write(&mut bench, CR, ADVREGEN | ADEN | ADSTART);
+        for (offset, other) in [(CFGR, 0), (SMPR2, 0b111), (PCSEL, 1 << 3), (SQR1, 3 << 6)] {
+            let before = read(&mut bench, offset);
+            write(&mut bench, offset, other);
+            assert_eq!(read(&mut bench, offset), before, "{offset:#x}");
+            assert_eq!(bench.told(), [CHANGED_WHILE_ARMED], "{offset:#x}");
+        }
+        write(&mut bench, CR, ADVREGEN | ADEN | ADSTP);
+        write(&mut bench, SMPR2, 0b111);
+        assert_eq!((read(&mut bench, SMPR2), bench.told().len()), (0b111, 0));
+    }
+
+    #[test]
+    fn a_scan_that_is_cut_short_has_no_end_and_the_next_one_is_whole() {
+        let mut bench = enabled(TIM6_RISING);
+        write(&mut bench, SQR1, 10 << 6 | 10 << 12 | 10 << 18 | 10 << 24 | 3);
+        write(&mut bench, CR, ADVREGEN | ADEN | ADSTART);
+        bench.part.adc1.cut_next_scan();
+        bench.advance(PERIOD);
+        assert!(!conversions(&mut bench));
+        bench.advance(PERIOD);
+        assert!(conversions(&mut bench));
+        assert_eq!(bench.part.adc1.triggers(), (2, 0));
     }
 
     #[test]

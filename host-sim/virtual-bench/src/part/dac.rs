@@ -12,7 +12,10 @@
 //!
 //! Left out, and told to the run when the firmware asks for it: hardware triggers, the wave generators, DMA
 //! requests, the sample-and-hold modes and the calibration. Left out silently: start-up and settling times
-//! (7.5 µs and 2 µs), and the buffer's offset and its 0.2 V of head-room.
+//! (7.5 µs and 2 µs), and the buffer's offset.
+//!
+//! With its output buffer on (`MODEx` 000 or 001) a channel reaches no nearer to either rail than 0.2 V; with the buffer
+//! off it reaches both (DS12110 rev 11, DAC characteristics, `V_DAC_OUT`). [`Dac::pin`] gives what is at the pin.
 
 use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::soc::stm32h743::generated::dac::Register;
@@ -32,6 +35,9 @@ const DMAEN: u64 = 1 << 12;
 const CEN: u64 = 1 << 14;
 const MODE: u64 = 0b111;
 const MODE_ON_CHIP_ONLY: u64 = 0b011;
+const MODE_UNBUFFERED: u64 = 0b010;
+/// Codes nearest to the rails that a buffered output reaches: 0.2 V of 3.3 V on either side.
+const BUFFERED: std::ops::RangeInclusive<u16> = 249..=3847;
 const MODE_SAMPLE_AND_HOLD: u64 = 0b100;
 
 const NO_TRIGGER: &str = "the hardware triggers of the DAC are not modelled";
@@ -50,10 +56,13 @@ pub struct Dac {
 }
 
 impl Dac {
-    /// The 12 bit code at the pin of channel 1 or 2 (index 0 or 1); `None` while the converter leaves it floating.
+    /// The voltage at the pin of channel 1 or 2 (index 0 or 1) as a 12 bit code; `None` while the converter leaves it
+    /// floating.
     #[must_use]
     pub fn pin(&self, channel: usize) -> Option<u16> {
-        self.pins.get(channel).copied().flatten()
+        let code = self.pins.get(channel).copied().flatten()?;
+        let buffered = Self::field(self.mode, channel) & MODE_UNBUFFERED == 0;
+        Some(if buffered { code.clamp(*BUFFERED.start(), *BUFFERED.end()) } else { code })
     }
 
     fn field(word: u64, channel: usize) -> u64 {
@@ -260,14 +269,14 @@ mod tests {
     fn with_ten_set_the_code_waits_for_the_software_trigger() {
         let mut bench = Bench::new();
         write(&mut bench, CR, EN | TEN | (EN | TEN) << STRIDE);
-        write(&mut bench, DHR12R1, 100);
-        write(&mut bench, DHR12R2, 200);
+        write(&mut bench, DHR12R1, 1000);
+        write(&mut bench, DHR12R2, 2000);
         assert_eq!(outputs(&mut bench), [0, 0]);
         write(&mut bench, SWTRGR, 0b01);
-        assert_eq!(outputs(&mut bench), [100, 0]);
+        assert_eq!(outputs(&mut bench), [1000, 0]);
         write(&mut bench, SWTRGR, 0b10);
-        assert_eq!(outputs(&mut bench), [100, 200]);
-        assert_eq!((bench.part.dac.pin(0), bench.part.dac.pin(1)), (Some(100), Some(200)));
+        assert_eq!(outputs(&mut bench), [1000, 2000]);
+        assert_eq!((bench.part.dac.pin(0), bench.part.dac.pin(1)), (Some(1000), Some(2000)));
         assert_eq!(bench.read(DAC.base + SWTRGR), 0, "the trigger bits are write-only and clear themselves");
         assert!(bench.told().is_empty());
     }
@@ -298,6 +307,20 @@ mod tests {
         write(&mut bench, DHR12R1, 5);
         assert_eq!(bench.part.dac.pin(0), None);
         assert_eq!(outputs(&mut bench), [5, 0]);
+    }
+
+    #[test]
+    fn a_buffered_output_stops_a_fifth_of_a_volt_from_the_rails_and_a_plain_one_does_not() {
+        for (mode, ends) in [(0b000, [249, 3847]), (0b001, [249, 3847]), (0b010, [0, 4095])] {
+            let mut bench = Bench::new();
+            write(&mut bench, MCR, mode);
+            write(&mut bench, CR, EN);
+            for (code, at_the_pin) in [0, 4095].into_iter().zip(ends) {
+                write(&mut bench, DHR12R1, code);
+                assert_eq!(bench.part.dac.pin(0), Some(at_the_pin), "mode {mode:03b}");
+                assert_eq!(outputs(&mut bench)[0], code, "the code itself is not touched");
+            }
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A part on its own, without a core: registers are written and read over its bus, time is moved by hand.
 
 use super::Part;
-use rigless::device::ResetCause;
+use rigless::device::{Level, ResetCause};
 use rigless::emulator::{Error, Memory};
 use rigless::mcu::{Mcu, Operate};
 use rigless::soc::Width;
@@ -23,11 +23,13 @@ impl Memory for NoMemory {
 pub(crate) struct Bench {
     pub(crate) part: Part,
     now: VirtualNanos,
+    /// Instances whose interrupt line stands.
+    lines: std::collections::BTreeSet<&'static str>,
 }
 
 impl Bench {
     pub(crate) fn new() -> Self {
-        let mut bench = Self { part: Part::new().unwrap(), now: VirtualNanos(0) };
+        let mut bench = Self { part: Part::new().unwrap(), now: VirtualNanos(0), lines: Default::default() };
         // DAC12EN, TIM6EN, TIM4EN, TIM2EN; ADC12EN (RM0433 sections 8.7.43 and 8.7.40).
         bench.write(RCC.base + 0xE8, 1 << 29 | 1 << 4 | 1 << 2 | 1 << 0);
         bench.write(RCC.base + 0xD8, 1 << 5);
@@ -52,6 +54,12 @@ impl Bench {
     fn settle(&mut self) {
         let refused = self.part.settle(&mut NoMemory).unwrap();
         assert!(refused.is_empty(), "refused: {refused:?}");
+        for change in self.part.drain_interrupts() {
+            match change.level {
+                Level::High => self.lines.insert(change.instance),
+                Level::Low => self.lines.remove(change.instance),
+            };
+        }
     }
 
     /// Moves time on, event by event, as a session does.
@@ -63,6 +71,11 @@ impl Bench {
             self.settle();
         }
         self.now = end;
+    }
+
+    /// Whether an interrupt line of this instance stands.
+    pub(crate) fn line_is_high(&self, instance: &str) -> bool {
+        self.lines.contains(instance)
     }
 
     /// What was told since the last call.

@@ -1,0 +1,48 @@
+//! The start that every program for this board shares: safe first, then clock, pins, outputs, core.
+//!
+//! The order matters: drive enables are driven low before anything else is set up, and the DAC starts at zero torque.
+//! Nothing here enables a drive. The firmware and the tests on the board begin with the same call, so that what is
+//! tested is what is flashed.
+
+use crate::board::{self, Board};
+use crate::{clocks, kept, outputs, restart};
+use rig_link::message::{KeptMessage, ResetCause};
+
+/// What the start found.
+pub struct Started {
+    /// Why the chip started.
+    pub reset: ResetCause,
+    /// What was kept from before the restart.
+    pub kept: Option<KeptMessage>,
+    /// The clock comes from the 8 MHz of the ST-LINK.
+    pub crystal: bool,
+    /// Peripherals that drivers still need.
+    pub board: Board,
+}
+
+/// Starts the board. To be called once, before anything else.
+#[must_use]
+pub fn start() -> Started {
+    let reset = restart::reset_cause();
+    let kept = kept::take();
+    let crystal = clocks::crystal_present();
+    let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
+    outputs::start();
+    clocks::yield_to_the_tick();
+    enable_core_features();
+    if crystal {
+        clocks::watch_crystal();
+    } else {
+        defmt::warn!("no 8 MHz from the ST-LINK: times and speeds may be off by 1 %");
+    }
+    Started { reset, kept, crystal, board }
+}
+
+/// Instruction cache and cycle counter; the data cache stays off (`memory.rs`).
+fn enable_core_features() {
+    // SAFETY: nothing else uses the core peripherals; this runs once, before any interrupt of ours.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    core.SCB.enable_icache();
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+}

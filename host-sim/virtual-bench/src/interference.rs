@@ -1,0 +1,95 @@
+//! Faults that reach into the chip: masked interrupts, locked DMA streams.
+//!
+//! Each is done over the bus or by code put beside the firmware's, so the firmware meets it as it would on silicon.
+
+use crate::part::Part;
+use rigless::emulator::Host;
+use rigless::mcu::Operate;
+use rigless::soc::Width;
+use rigless::soc::stm32h743::generated::{DMA1, DMAMUX1, TIM6};
+use rigless::time::VirtualNanos;
+
+/// `DMAREQ_ID` of USART3's receiver and transmitter, RM0433 table 121.
+const USART3_REQUESTS: [u64; 2] = [45, 46];
+/// `TRBUFF` of `DMA_SxCR`, RM0433 section 15.5.5.
+const TRBUFF: u64 = 1 << 20;
+/// `SxCR` of stream 0, and the distance of two streams.
+const FIRST_CONTROL: u64 = 0x10;
+const STREAM_STRIDE: u64 = 0x18;
+
+/// Where the code that masks interrupts lies: the end of SRAM3, which the firmware does not use.
+const STUB: u64 = 0x3004_7F00;
+/// `TIMx_CNT`.
+const COUNTER: u64 = 0x24;
+/// Nanoseconds of one round of the stub's loop: two instructions.
+const ROUND_NS: u64 = 2 * 1_000_000_000 / crate::board::INSTRUCTIONS_PER_SECOND.get();
+
+/// Locks the streams up that serve USART3 without `TRBUFF` (ES0392 rev 15, 2.20.4): their requests are no longer
+/// served, `EN` stands and the counter stays. Says whether there was one.
+pub(crate) fn lock_up_serial_streams(part: &mut Part, at: VirtualNanos) -> bool {
+    let mut locked = false;
+    for stream in 0..8 {
+        let channel = DMAMUX1.base + 4 * stream;
+        let request = read(part, at, channel) & 0x7F;
+        let control = read(part, at, DMA1.base + FIRST_CONTROL + STREAM_STRIDE * stream);
+        if USART3_REQUESTS.contains(&request) && control & TRBUFF == 0 {
+            write(part, at, channel, 0);
+            locked = true;
+        }
+    }
+    locked
+}
+
+/// A register; 0 where nothing answers.
+pub(crate) fn read(part: &mut Part, at: VirtualNanos, address: u64) -> u64 {
+    Operate::read(part, at, address, Width::W32).unwrap_or_default()
+}
+
+fn write(part: &mut Part, at: VirtualNanos, address: u64, value: u64) {
+    // The controllers' clocks are on: the firmware uses them.
+    let _ = Operate::write(part, at, address, Width::W32, value);
+}
+
+/// Where the vector of an interrupt lies.
+pub(crate) const fn vector(line: u64) -> u64 {
+    0x0800_0000 + 4 * (16 + line)
+}
+
+/// Puts code in front of the handler `original` that waits until TIM6 is within a microsecond after `from_ns` of its
+/// period and then masks all interrupts for `for_ns`, the next `times` times the interrupt comes. Gives the word for
+/// the interrupt's vector.
+pub(crate) fn masking_stub(host: &mut dyn Host, original: u64, times: u32, from_ns: u64, for_ns: u64) -> u64 {
+    const FLAG: u64 = STUB + 0x3C;
+    let code: [u16; 20] = [
+        0x4B09, // ldr  r3, flag
+        0x6818, // ldr  r0, [r3]
+        0x2800, // cmp  r0, #0
+        0xD00C, // beq  out
+        0x3801, // subs r0, #1
+        0x6018, // str  r0, [r3]
+        0x4907, // ldr  r1, counter
+        0x4A08, // ldr  r2, target
+        0x6808, // wait: ldr r0, [r1]
+        0x1A80, // subs r0, r0, r2
+        0x28F0, // cmp  r0, #240
+        0xD2FB, // bhs  wait
+        0xB672, // cpsid i
+        0x4806, // ldr  r0, rounds
+        0x3801, // loop: subs r0, #1
+        0xD1FD, // bne  loop
+        0xB662, // cpsie i
+        0x4805, // out: ldr r0, original
+        0x4700, // bx   r0
+        0xBF00, // nop
+    ];
+    let target = from_ns * 240 / 1000;
+    let words = [FLAG, TIM6.base + COUNTER, target, (for_ns / ROUND_NS).max(1), original | 1, times.into()];
+    // It is RAM the firmware leaves alone.
+    for (at, half) in (STUB..).step_by(2).zip(code) {
+        let _ = host.write(at, Width::W16, half.into());
+    }
+    for (at, word) in (STUB + 0x28..).step_by(4).zip(words) {
+        let _ = host.write(at, Width::W32, word);
+    }
+    STUB | 1
+}

@@ -1,0 +1,256 @@
+//! What the reference manual, the errata sheet and the wires ask of the firmware, one test each.
+
+use super::firmware;
+use host_sim::files::experiment_file::ExperimentFile;
+use model_core::control::{Fault, Mode};
+use rig_link::message::{Answer, Command, Rejection};
+use rig_link::telemetry::Health;
+use std::sync::OnceLock;
+use virtual_bench::bench::{self, Outcome};
+use virtual_bench::campaign::states::State;
+use virtual_bench::campaign::witness::Witness;
+use virtual_bench::defmt_log;
+use virtual_bench::desk::Desk;
+use virtual_bench::elf::Firmware;
+use virtual_bench::error::BenchError;
+use virtual_bench::experiment::{self, Request};
+use virtual_bench::firmware_build;
+use virtual_bench::outside::{Action, ReferenceWire};
+use virtual_bench::part::Motor;
+use virtual_bench::record::Saved;
+
+/// The rig kept in this state, made once.
+fn kept(state: State) -> &'static Saved {
+    static KEPT: [OnceLock<Saved>; 5] = [const { OnceLock::new() }; 5];
+    KEPT[state as usize].get_or_init(|| state.kept(firmware()).unwrap())
+}
+
+/// Goes on from a state.
+fn from<T: Send>(
+    state: State,
+    operator: impl FnOnce(&mut Desk, &mut Witness) -> Result<T, BenchError> + Send,
+) -> Outcome<T> {
+    bench::run_on(firmware(), kept(state), &std::env::temp_dir(), |desk| {
+        let mut witness = Witness::new();
+        operator(desk, &mut witness)
+    })
+    .unwrap()
+}
+
+/// Waits two health records long, and gives the last.
+fn health(desk: &mut Desk, witness: &mut Witness) -> Result<Health, BenchError> {
+    witness.health = None;
+    witness.listen(desk, desk.now_ns() + 210_000_000)?;
+    witness.health.ok_or_else(|| BenchError::Rig("it does not tell its health".to_owned()))
+}
+
+#[test]
+fn ticks_come_once_a_period_though_the_write_that_acknowledges_it_is_posted() {
+    let ticks = from(State::Armed, |desk, _| {
+        desk.begin_measuring()?;
+        desk.wait_until(desk.now_ns() + 100_000_000)?;
+        desk.end_measuring()
+    })
+    .operator;
+    assert_eq!((ticks.instructions.count, ticks.late), (1000, 0), "control ticks in a tenth of a second");
+}
+
+#[test]
+fn interrupts_masked_over_the_end_of_a_period_make_no_tick_more_or_less() {
+    let (before, ticks, after) = from(State::Sliding, |desk, witness| {
+        let before = health(desk, witness)?;
+        // From 2 µs before the end of the period to 8 µs into the next, when its scan is in memory.
+        desk.act(Action::MaskInterrupts { times: 20, from_ns: 98_000, for_ns: 10_000 })?;
+        desk.begin_measuring()?;
+        witness.listen(desk, desk.now_ns() + 100_000_000)?;
+        let ticks = desk.end_measuring()?;
+        Ok((before, ticks, health(desk, witness)?))
+    })
+    .operator;
+    assert!(ticks.start_after_trigger_ns.max > 7_000, "interrupts were not masked: {ticks:?}");
+    assert_eq!(ticks.instructions.count, 1000);
+    assert_eq!(after.missed_scans, before.missed_scans);
+    assert_eq!((after.mode, after.fault), (Mode::Running.number(), 0));
+}
+
+#[test]
+fn a_torque_reference_that_does_not_arrive_is_a_fault() {
+    for (state, motor, wire, fault) in [
+        (State::Armed, Motor::M1, ReferenceWire::Open, Fault::M1TorqueMismatch),
+        (State::Armed, Motor::M2, ReferenceWire::Open, Fault::M2TorqueMismatch),
+        (State::Sliding, Motor::M1, ReferenceWire::Open, Fault::M1TorqueMismatch),
+        (State::Sliding, Motor::M2, ReferenceWire::Open, Fault::M2TorqueMismatch),
+        (State::Torque, Motor::M2, ReferenceWire::Reversed, Fault::M2TorqueMismatch),
+        (State::Torque, Motor::M2, ReferenceWire::Scaled(0.5), Fault::M2TorqueMismatch),
+        (State::Torque, Motor::M1, ReferenceWire::Held(2048), Fault::M1TorqueMismatch),
+    ] {
+        let outcome = from(state, |desk, witness| {
+            witness.listen(desk, desk.now_ns() + 5_000_000)?;
+            let at = desk.now_ns();
+            desk.act(Action::Reference(motor, wire))?;
+            let health = health(desk, witness)?;
+            Ok((at, health))
+        });
+        let (at, health) = outcome.operator;
+        assert_eq!(Fault::from_number(health.fault), Some(fault), "{state:?} {motor:?} {wire:?}");
+        let safe = outcome.record.safe_for_good_from(at).unwrap() - at;
+        assert!(safe < 6_000_000, "{state:?} {motor:?} {wire:?}: safe after {safe} ns");
+    }
+}
+
+// It shows that the scan comes back in step. That a stream stopped with its interrupt on enters its handler again and
+// again is not shown: without that order this passes too.
+#[test]
+fn a_scan_cut_short_is_started_anew_and_forgiven() {
+    let (before, after, restarts) = {
+        let outcome = from(State::Sliding, |desk, witness| {
+            let before = health(desk, witness)?;
+            desk.act(Action::AdcScanCut)?;
+            witness.listen(desk, desk.now_ns() + 20_000_000)?;
+            Ok((before, health(desk, witness)?))
+        });
+        (outcome.operator.0, outcome.operator.1, outcome.record.restarts)
+    };
+    assert!(restarts.is_empty(), "{restarts:?}");
+    assert_eq!((after.mode, after.fault), (Mode::Running.number(), 0), "{after:?}");
+    assert!(after.missed_scans > before.missed_scans, "no scan was cut");
+}
+
+#[test]
+fn the_serial_streams_do_not_lock_up() {
+    let after = from(State::Armed, |desk, witness| {
+        desk.act(Action::SerialStreamsLockUp)?;
+        witness.listen(desk, desk.now_ns() + 1_000_000_000)?;
+        witness.ask(desk, &Command::Hello)?;
+        health(desk, witness)
+    })
+    .operator;
+    assert_eq!((after.mode, after.fault), (Mode::Armed.number(), 0));
+}
+
+#[test]
+fn a_host_that_falls_silent_disarms_the_rig() {
+    let outcome = from(State::Armed, |desk, witness| {
+        witness.lively = false;
+        let at = desk.now_ns();
+        witness.listen(desk, at + 600_000_000)?;
+        witness.lively = true;
+        Ok((at, health(desk, witness)?))
+    });
+    let (at, health) = outcome.operator;
+    assert_eq!(Fault::from_number(health.fault), Some(Fault::LinkLost));
+    let safe = outcome.record.safe_for_good_from(at).unwrap() - at;
+    assert!(safe < 600_000_000, "{safe} ns");
+}
+
+#[test]
+fn a_model_is_stored_only_while_the_drives_are_off() {
+    for state in [State::Armed, State::Sliding] {
+        let (answer, after) = from(state, |desk, witness| {
+            let answer = witness.ask(desk, &Command::ModelForget)?;
+            Ok((answer, health(desk, witness)?))
+        })
+        .operator;
+        assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled), "{state:?}");
+        assert_eq!(after.fault, 0, "{state:?}");
+    }
+    let answer = from(State::Idle, |desk, witness| witness.ask(desk, &Command::ModelForget)).operator;
+    assert_eq!(answer, Answer::Model(None));
+}
+
+#[test]
+fn a_restart_is_done_only_while_the_drives_are_off() {
+    let answer = from(State::Armed, |desk, witness| witness.ask(desk, &Command::Restart)).operator;
+    assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled));
+}
+
+// At 30 rpm 3 µs are less than a count, so this shows that a late tick does no harm, and not what latching the counters is
+// for: that takes 300 rpm, where they are seven counts.
+#[test]
+fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
+    let outcome = from(State::Sliding, |desk, witness| {
+        // The tick is due 5 µs into the period: it comes 3 µs later.
+        desk.act(Action::MaskInterrupts { times: 200, from_ns: 3_500, for_ns: 4_500 })?;
+        desk.begin_measuring()?;
+        witness.listen(desk, desk.now_ns() + 200_000_000)?;
+        let ticks = desk.end_measuring()?;
+        Ok((ticks, health(desk, witness)?))
+    });
+    let (ticks, health) = outcome.operator;
+    assert!(ticks.start_after_trigger_ns.max > 7_500, "the tick was not late: {ticks:?}");
+    assert_eq!((health.mode, health.fault), (Mode::Running.number(), 0));
+}
+
+#[test]
+fn pulses_coupled_into_the_encoders_lines_do_not_count() {
+    for state in [State::Armed, State::Sliding] {
+        let after = from(state, |desk, witness| {
+            for _ in 0..50 {
+                desk.act(Action::EncoderDisturbed(Motor::M2, 20))?;
+                witness.listen(desk, desk.now_ns() + 1_000_000)?;
+            }
+            health(desk, witness)
+        })
+        .operator;
+        assert_eq!(after.fault, 0, "{state:?}");
+    }
+    // At rest every count is the disturbance's.
+    let (before, after) = from(State::Armed, |desk, witness| {
+        witness.ask(desk, &Command::Telemetry { every_ticks: 10 })?;
+        witness.listen(desk, desk.now_ns() + 10_000_000)?;
+        let before = witness.row;
+        for _ in 0..50 {
+            desk.act(Action::EncoderDisturbed(Motor::M2, 20))?;
+            witness.listen(desk, desk.now_ns() + 1_000_000)?;
+        }
+        Ok((before, witness.row))
+    })
+    .operator;
+    let (before, after) = (before.unwrap(), after.unwrap());
+    assert!(after.tick > before.tick + 400);
+    assert_eq!(before.m2_count, after.m2_count);
+}
+
+/// M2 is asked for all it has, for 20 ms.
+const RATED: &str = "name = \"rated\"\ntitle = \"Rated torque\"\nduration_s = 0.1\nseed = 1\nlog_rate_hz = 1000\n\
+    [[m1]]\nstart_s = 0.0\ntorque_fraction = 0.0\n[[m2]]\nstart_s = 0.0\ntorque_fraction = 0.0\n\
+    [[m2]]\nstart_s = 0.02\ntorque_fraction = 1.0\n[[m2]]\nstart_s = 0.04\ntorque_fraction = 0.0\n";
+
+#[test]
+fn the_rated_torque_reaches_the_pin() {
+    let mut request = Request::assumed("fig20").unwrap();
+    request.experiment = ExperimentFile::parse("rated.toml", RATED).unwrap();
+    request.capture = false;
+    let done = experiment::run(firmware(), &request, |_, _| ()).unwrap();
+    let codes = done.record.outputs.iter().filter_map(|(_, outputs)| outputs.dac[1]);
+    assert_eq!(codes.max(), Some(4095));
+}
+
+#[test]
+fn the_watchdog_counts_on_while_a_debugger_holds_the_core() {
+    // DBGMCU_APB4FZ1 and its bit of the independent watchdog in RM0433.
+    const FREEZE: u64 = 0x5C00_1054;
+    let frozen = from(State::Armed, |desk, _| desk.register(FREEZE)).operator;
+    assert_eq!(frozen >> 18 & 1, 0);
+}
+
+#[test]
+fn the_self_test_of_the_board_passes_with_the_shipped_start() {
+    let elf = firmware_build::release_elf_of(firmware_build::SELF_TEST).unwrap();
+    let program = Firmware::read(&elf).unwrap();
+    let plant = Request::assumed("fig20").unwrap().plant().unwrap();
+    let outcome = bench::run(&program, Box::new(plant), |desk| desk.wait_until(8_000_000_000)).unwrap();
+    let log = defmt_log::decode(&program.bytes, &outcome.record.log).unwrap();
+    let said = |name: &str| log.lines.iter().find(|line| line.contains(&format!("self-test: {name}")));
+    for name in ["clock", "models", "making safe", "loop-back", "ticks"] {
+        let line = said(name).unwrap_or_else(|| panic!("{name} was not reached: {:#?}", log.lines));
+        assert!(line.ends_with("ok"), "{line}");
+    }
+    // The bench has wires where the board must have none, and no pull resistors that move a timer's input.
+    for (name, why) in [("inputs", "reads as"), ("encoders", "counts of M1")] {
+        assert!(said(name).unwrap().contains(why), "{:?}", said(name));
+    }
+    assert!(said("done, 2 failed").is_some(), "{:#?}", log.lines);
+    assert!(outcome.record.restarts.is_empty());
+    assert!(outcome.record.outputs.last().unwrap().1.is_safe());
+}
