@@ -111,7 +111,7 @@ fn draw_panel(
 fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     // A line that is flat has some room too.
-    (low <= high).then(|| if high > low { (low, high) } else { (low - 0.5, high + 0.5) })
+    (low <= high).then_some(if high > low { (low, high) } else { (low - 0.5, high + 0.5) })
 }
 
 /// The lowest and the highest point of each column.

@@ -70,8 +70,9 @@ impl Screen {
     pub(super) fn look(&mut self, history: &mut History) -> bool {
         while poll(Duration::ZERO).unwrap_or(false) {
             match read() {
-                Ok(Event::Key(key)) if key.kind != KeyEventKind::Release => {
-                    if self.pressed(key, history) {
+                Ok(Event::Key(key)) => {
+                    let down = key.kind != KeyEventKind::Release;
+                    if down && self.pressed(key, history) {
                         return true;
                     }
                 }
