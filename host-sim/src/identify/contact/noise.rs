@@ -40,7 +40,7 @@ pub struct Noise {
     pub deviation: Vec<f64>,
     /// n² of each source for each sample.
     sources: Vec<[f64; SOURCES]>,
-    /// Samples that count as one: the spectral density of the residuals below [`SLOW_HZ`] over their variance.
+    /// Samples that count as one: the spectral density of the residuals below 30 Hz over their variance.
     pub temper: f64,
     /// The sensor's factor a, as fitted.
     pub sensor_factor: f64,

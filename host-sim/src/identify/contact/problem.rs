@@ -1,7 +1,7 @@
 //! The contact's balance as one likelihood: what the friction channel should have shown, given the observed slip.
 //!
 //! y = channel( F(observed slip; parameters) ) + e,   e/σ Student-t with ν = 4, σ from named sources
-//! ([`super::noise`]), a share 1/T of the samples counted as independent. Normal priors on all parameters; those of the
+//! (`noise.rs`), a share 1/T of the samples counted as independent. Normal priors on all parameters; those of the
 //! baseline are bounded smoothly at three deviations, so that nothing else can hide in them.
 
 use nalgebra::DMatrix;
