@@ -2,8 +2,8 @@
 //!
 //! The rig arms only with its arm switch turned on by a person after the last disarming, so the procedure
 //! says so and tries again until it is. It ends when the rig is at rest again, or with a fault: what was
-//! recorded until then is kept. From the start of the run on it sends the signs of life without which the rig
-//! stops by itself.
+//! recorded until then is kept. From the first try to arm until the drives are off it sends the signs of life without
+//! which the rig stops by itself.
 
 use model_core::control::{Experiment, Fault, Mode, Refusal, SequencerState};
 use rig_link::message::{Answer, Command, EventKind, EventMessage, Hello, Message};
@@ -348,7 +348,8 @@ impl Procedure for RunExperiment {
         self.ask.step(now_s, client)?;
         self.take_messages(now_s);
         self.advance(now_s)?;
-        if matches!(self.phase, Phase::Starting | Phase::Running | Phase::ComingToRest { .. }) {
+        // An answer may be lost, and asking again takes longer than an armed rig waits.
+        if self.is_live() {
             self.keep_alive.step(now_s, client);
         }
         self.record.frames_rejected = client.frames_rejected();
