@@ -128,6 +128,19 @@ impl Lockstep {
         self.state.mode()
     }
 
+    /// Asks until the core arms: its inputs permit only once they have been steady for a while.
+    fn arm(&mut self) -> Result<(), InputError> {
+        let mut refused = Ok(());
+        for _ in 0..MOST_ARMING_TICKS {
+            self.tick();
+            refused = self.command(Command::Arm);
+            if refused.is_ok() {
+                break;
+            }
+        }
+        refused
+    }
+
     fn wait_for(&mut self, mode: Mode) -> Result<(), InputError> {
         for _ in 0..MOST_ARMING_TICKS {
             let frame = self.tick();
@@ -155,8 +168,7 @@ pub fn run(setup: &Setup, mut progress: impl FnMut(usize, usize)) -> Result<Reco
     rig.wait_for(Mode::Disabled)?;
     // The switch must be seen off, then on, before the command is accepted.
     rig.set_arm_switch(true);
-    rig.tick();
-    rig.command(Command::Arm)?;
+    rig.arm()?;
     rig.wait_for(Mode::Armed)?;
     rig.command(Command::LoadExperiment(&prepared))?;
     rig.command(Command::Start)?;
