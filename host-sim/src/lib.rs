@@ -4,7 +4,6 @@
 pub mod cli;
 pub mod demo;
 pub mod design;
-pub mod diagnose;
 pub mod files;
 pub mod fit;
 pub mod identify;

@@ -6,12 +6,11 @@
 //! with independent generators are for.
 
 use super::runs::Runs;
-use crate::diagnose::page;
-use crate::diagnose::results::Diagnosis;
-use crate::diagnose::run::{Case, Outcome};
 use crate::files::log::Log;
 use crate::files::model_file::{ModelFile, ModelKind};
 use crate::files::rig_file::RigFile;
+use crate::identify::command::{Written, diagnose};
+use crate::identify::results::Diagnosis;
 use crate::input_error::InputError;
 use crate::report::Block;
 
@@ -48,9 +47,8 @@ impl Story {
         });
         let (holdout, train): (Vec<_>, Vec<_>) = logs.partition(|(name, _)| *name == HELD_OUT);
         let only = |logs: Vec<(&str, Log)>| logs.into_iter().map(|(_, log)| log).collect::<Vec<_>>();
-        let case = Case::new(only(train), only(holdout), &rig, &baseline)?;
-        let Outcome { judged, notes, .. } = case.judge(&|_| ());
-        let diagnosis = Diagnosis::new(&judged, &[], notes, String::new(), 0.0);
+        let (train, holdout): (Vec<Log>, Vec<Log>) = (only(train), only(holdout));
+        let Written { diagnosis, page, .. } = diagnose(&train, &holdout, &rig, &baseline, &|| 0.0, &|_| ())?;
         let lead = format!(
             "The logs of Figs. 18–21 (1 kHz; Fig. 19 held out) are given to rig diagnose with a LuGre model. {}",
             diagnosis.sentence
@@ -58,8 +56,9 @@ impl Story {
         let mut blocks =
             vec![Block::Heading("What a model without the block gets wrong".into()), Block::Text(lead)];
         // One heading is enough here, and of the subsystems only what the table says.
-        let own = page::page(&diagnosis, &judged).blocks;
-        blocks.extend(own.into_iter().filter(|block| matches!(block, Block::List(_) | Block::Chart(_))));
+        blocks.extend(
+            page.blocks.into_iter().filter(|block| matches!(block, Block::List(_) | Block::Chart(_))),
+        );
         Ok(Self { diagnosis, blocks })
     }
 
