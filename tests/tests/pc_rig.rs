@@ -62,9 +62,9 @@ fn reference(setup: &Setup) -> Vec<f64> {
             if enabled { (f64::from(outputs.dac[k]) - 2048.0) / 2048.0 * 8.0 } else { 0.0 }
         });
         match core.mode() {
+            // The inputs permit only once they have been steady for a while: ask until the core arms.
             Mode::Disabled if arm_switch && !armed => {
-                apply(&mut config, &mut core, Command::Arm).unwrap();
-                armed = true;
+                armed = apply(&mut config, &mut core, Command::Arm).is_ok();
             }
             Mode::Disabled => arm_switch = true,
             Mode::Armed if !started => {
