@@ -96,7 +96,8 @@ mod tests {
 
     #[test]
     fn one_unsafe_sample_is_unsafe_and_safe_takes_its_time_without_a_break() {
-        let spoil: [(fn(&mut Samples), fn(&Lines) -> bool); 4] = [
+        type Spoilt = (fn(&mut Samples), fn(&Lines) -> bool);
+        let spoil: [Spoilt; 4] = [
             (|s| s.emergency_stop = true, |l| l.emergency_stop),
             (|s| s.arm_switch = false, |l| !l.arm_switch),
             (|s| s.m1_drive_fault = true, |l| l.m1_drive_fault),
