@@ -147,7 +147,7 @@ impl Drive {
             let reference = SAG_REFERENCE_RAD_S * self.numbers.units.travel;
             shaft *= 1.0 - sag * (self.motor_speed / reference).powi(2).min(2.0);
         }
-        shaft += self.offset.map_or(0.0, |offset| offset.at(time_s, self.motor_angle));
+        shaft += self.offset.map_or(0.0, |offset| offset.at(time_s));
         shaft += self.ripple.as_ref().map_or(0.0, |ripple| ripple.at(self.motor_angle));
         let drag = self.drag(normal_n);
         let (h, inertia) = (self.step_s, self.numbers.inertia);

@@ -15,6 +15,15 @@ use super::filters::median_magnitude;
 use super::linear::{self, dot};
 use super::term::Parameter;
 
+/// The disc where it does not move as the motor does.
+#[derive(Debug, Clone)]
+pub struct DiscMotion {
+    /// Its angle in each log.
+    pub angle_rad: Vec<Vec<f64>>,
+    /// Error of its speed for an error of the torque that drives it, rad/s per N m.
+    pub speed_per_torque: f64,
+}
+
 /// A form of an effect in a balance.
 #[derive(Debug, Clone)]
 pub struct Alternative {
@@ -28,8 +37,8 @@ pub struct Alternative {
     pub columns: Vec<Vec<f64>>,
     /// What is added to the response.
     pub response: Option<Vec<f64>>,
-    /// Angle of the disc in each log, where this form parts it from the motor's.
-    pub disc_position: Option<Vec<Vec<f64>>>,
+    /// Motion of the disc, where this form parts it from the motor's.
+    pub disc: Option<DiscMotion>,
     /// Base columns that this form replaces, by their place.
     pub replaces: Vec<(usize, Vec<f64>)>,
     /// Change of the prior means of base parameters.
@@ -49,7 +58,7 @@ impl Alternative {
             parameters,
             columns,
             response: None,
-            disc_position: None,
+            disc: None,
             replaces: Vec::new(),
             base_shift: Vec::new(),
             constants: Vec::new(),
@@ -71,6 +80,8 @@ pub struct Balance {
     pub first_deviation: Vec<f64>,
     /// Rows that take part.
     pub used: Vec<usize>,
+    /// Usual size of the torques whose sum the response is: what errors of form are relative to.
+    pub scale: f64,
     /// Rows that count as one.
     pub temper: f64,
     /// Distance of the used rows, s.

@@ -283,6 +283,7 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         first_deviation: deviation.clone(),
         deviation,
         used,
+        scale: scales.effort,
         temper: 3.0,
         row_step_s,
         starts,

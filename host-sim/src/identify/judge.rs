@@ -23,6 +23,8 @@ use crate::input_error::InputError;
 
 /// Sets of effects in the drive's and in the press's balance have at most so many.
 const MOST_AT_ONCE: usize = 2;
+/// A hypothesis has at most so many causes: more are no explanation but a fit, and what they would explain is left as it is.
+const MOST_CAUSES: usize = 3;
 /// ln of the prior probability that an effect of the library acts: one in fifty.
 const LOG_PRIOR: f64 = -3.9;
 /// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
@@ -101,6 +103,16 @@ pub struct ContactPart {
     pub noise: Noise,
     /// Sets, best first.
     pub ranked: Vec<search::Ranked>,
+    /// The drive's cause that moves the contact otherwise than the encoder says.
+    pub disc_cause: Option<DiscCause>,
+}
+
+/// A cause in the drive that moves the contact.
+pub struct DiscCause {
+    /// Its id.
+    pub effect: &'static str,
+    /// Residuals of the baseline with the motion as logged, over their deviations.
+    pub residual: Vec<f64>,
 }
 
 impl ContactPart {
@@ -170,16 +182,12 @@ impl Linear {
             if !wanted {
                 continue;
             }
+            let changes = self.changes(solved);
             let mut effects: Vec<(&'static str, f64)> = solved
                 .set
                 .iter()
-                .map(|a| {
-                    let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
-                    let without = self.balance.solve(&self.alternatives, &set);
-                    let size =
-                        self.balance.difference(&solved.residual, &without.residual) / self.signal.max(1e-12);
-                    (self.alternatives[*a].effect, size)
-                })
+                .zip(changes)
+                .map(|(a, change)| (self.alternatives[*a].effect, change / self.signal.max(1e-12)))
                 .collect();
             effects.sort_by_key(|e| e.0);
             debug_assert_eq!(names(&solved.set), effects.iter().map(|e| e.0).collect::<Vec<_>>());
@@ -193,10 +201,21 @@ impl Linear {
         out
     }
 
+    /// RMS change of the prediction when each alternative of a set is taken out and the others are fitted again.
+    fn changes(&self, solved: &Solved) -> Vec<f64> {
+        let change = |a: &usize| {
+            let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
+            self.balance.difference(&solved.residual, &self.balance.solve(&self.alternatives, &set).residual)
+        };
+        solved.set.iter().map(change).collect()
+    }
+
     /// What a set leaves.
     pub fn rest(&self, place: usize) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());
-        rest::of_balance(&self.balance, &self.solved[place].residual, none.map(|s| s.residual.as_slice()))
+        let solved = &self.solved[place];
+        let explained = self.changes(solved).into_iter().reduce(f64::min).unwrap_or(0.0);
+        rest::of_balance(&self.balance, &solved.residual, none.map(|s| s.residual.as_slice()), explained)
     }
 }
 
@@ -277,9 +296,9 @@ pub fn judge(
         };
         told("drive");
         drive = of_drive(&logs);
-        if let Some(found) = &drive {
-            follow_disc(&mut logs, found);
-        } else {
+        let as_logged = logs.clone();
+        let parted = drive.as_ref().and_then(|found| follow_disc(&mut logs, found));
+        if drive.is_none() {
             notes.push("no torque of M2: the drive is not looked at".to_string());
         }
         let presses: Option<Vec<PressLog>> = logs.iter().map(PressLog::new).collect();
@@ -306,7 +325,11 @@ pub fn judge(
             seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
             drive = of_drive(&seen);
         }
-        contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked });
+        let disc_cause = parted.map(|effect| {
+            let before = Problem::with_noise(&as_logged, &baseline, &terms, noise.clone());
+            DiscCause { effect, residual: search::baseline(&before).r }
+        });
+        contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked, disc_cause });
     } else {
         let logs = train.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
         told("drive");
@@ -344,18 +367,21 @@ pub fn judge(
     Ok(judgement)
 }
 
-/// Lets the contact move with the disc, where the drive's best set parts it from the motor's encoder.
-fn follow_disc(logs: &mut [ContactLog], drive: &Linear) {
-    let Some(best) = drive.solved.first() else { return };
-    let none = drive.solved.iter().find(|s| s.set.is_empty()).map_or(best, |s| s);
+/// Lets the contact move with the disc, where the drive's best set parts it from the motor's encoder; the cause's id.
+fn follow_disc(logs: &mut [ContactLog], drive: &Linear) -> Option<&'static str> {
+    let (place, best) = (0, drive.solved.first()?);
+    let none = drive.solved.iter().find(|s| s.set.is_empty())?;
     // A motion that leaves much of the drive's torque unexplained is no better than the encoder's.
     if drive.balance.rms(&best.residual) > TRUSTED_MOTION * drive.balance.rms(&none.residual) {
-        return;
+        return None;
     }
-    let disc = best.set.iter().find_map(|a| drive.alternatives[*a].disc_position.as_ref());
-    for (log, position) in logs.iter_mut().zip(disc.into_iter().flatten()) {
-        log.follow(position);
+    let torque_error = drive.rest(place).size * drive.balance.scale;
+    let cause = best.set.iter().map(|a| &drive.alternatives[*a]).find(|a| a.disc.is_some())?;
+    let disc = cause.disc.as_ref()?;
+    for (log, angle_rad) in logs.iter_mut().zip(&disc.angle_rad) {
+        log.follow(angle_rad, disc.speed_per_torque * torque_error);
     }
+    Some(cause.effect)
 }
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
@@ -393,7 +419,7 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
         for set in &sets {
             for candidate in candidates {
                 let joined = sorted(set.iter().chain(&candidate.effects).copied().collect());
-                if !next.contains(&joined) {
+                if joined.len() <= MOST_CAUSES && !next.contains(&joined) {
                     next.push(joined);
                 }
             }
@@ -480,7 +506,8 @@ impl Judgement {
     fn rests(&self) -> Vec<(Part, Rest)> {
         let mut out = Vec::new();
         if let (Some(contact), Some(place)) = (&self.contact, self.place(Part::Friction)) {
-            out.push((Part::Friction, rest::of_contact(contact, place)));
+            let disc_cause = contact.disc_cause.as_ref().filter(|c| self.best().effects.contains(&c.effect));
+            out.push((Part::Friction, rest::of_contact(contact, place, disc_cause)));
         }
         for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.press)] {
             if let (Some(linear), Some(place)) = (linear, self.place(part)) {

@@ -166,6 +166,7 @@ pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balanc
         first_deviation: deviation.clone(),
         deviation,
         used,
+        scale: scales.torque_nm,
         temper: 3.0,
         row_step_s,
         starts,

@@ -2,14 +2,17 @@
 
 use super::balance::Balance;
 use super::contact::noise::MODEL_FORM;
-use super::judge::ContactPart;
+use super::contact::search;
+use super::judge::{ContactPart, DiscCause};
 
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts.
 const BLOCK_S: f64 = 0.05;
 /// A rest is beyond the form of a model where it is this many times [`MODEL_FORM`] of the signal: what a wrong law leaves.
 const BEYOND_FORM: f64 = 3.0;
-/// The rest is most of the residual where it holds this share of the baseline's mean square.
+/// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
 const MOST: f64 = 0.5;
+/// Steepness of both steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
+const STEEPNESS: f64 = 8.0;
 
 /// What is left of a balance.
 #[derive(Debug, Clone, Default)]
@@ -18,6 +21,8 @@ pub struct Rest {
     pub size: f64,
     /// Mean square of the structured rest over the baseline's.
     pub share: f64,
+    /// Smallest change of the prediction that a named cause makes here, RMS over that of the signal; 0 where none acts.
+    pub explained: f64,
     /// Mean square of the structured rest over that of the noise.
     pub times_noise: f64,
     /// What it goes along with: quantity and share of its variance.
@@ -25,11 +30,11 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// Probability that it is something that the library does not have.
+    /// Probability that it is something that the library does not have: larger than the form of a model is wrong, and as
+    /// large as what a cause explains.
     pub fn unknown(&self) -> f64 {
-        let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
-        logistic(8.0 * (self.size / (BEYOND_FORM * MODEL_FORM)).max(1e-9).ln())
-            * logistic((self.share - MOST) / 0.05)
+        let step = |ratio: f64| 1.0 / (1.0 + (-STEEPNESS * ratio.max(1e-9).ln()).exp());
+        step(self.size / (BEYOND_FORM * MODEL_FORM)) * step(self.size / (MOST * self.explained).max(1e-12))
     }
 }
 
@@ -50,12 +55,17 @@ fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> 
     ((sum / count - left / count).max(0.0), left / count)
 }
 
-/// Of the contact's balance.
-pub fn of_contact(contact: &ContactPart, place: usize) -> Rest {
+/// Of the contact's balance; `disc_cause` where the hypothesis has it.
+pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscCause>) -> Rest {
     let problem = contact.problem();
-    let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit);
+    let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit.r);
+    let mut explained = search::sizes(&problem, contact.fit(place));
+    if let (Some(cause), Some(none)) = (disc_cause, none) {
+        explained.push(search::difference(&problem, none, &cause.residual));
+    }
+    let none = disc_cause.map(|cause| &cause.residual).or(none);
     let fit = contact.fit(place);
-    let limit = 10.0 * contact.logs.iter().map(|log| log.friction_noise_nm).fold(0.0, f64::max);
+    let limit = problem.well_known_nm();
     let deviation = &problem.noise.deviation;
     let rows: Vec<usize> =
         (0..deviation.len()).filter(|i| deviation[*i] < limit && fit.r[*i] != 0.0).collect();
@@ -67,11 +77,12 @@ pub fn of_contact(contact: &ContactPart, place: usize) -> Rest {
     let block = (BLOCK_S / step_s).round().max(1.0) as usize;
     let residual = in_units(&fit.r);
     let (rest, left) = structured(&residual, &noise, &rows, block);
-    let before = none.map_or(rest, |none| structured(&in_units(&none.r), &noise, &rows, block).0);
+    let before = none.map_or(rest, |none| structured(&in_units(none), &noise, &rows, block).0);
     let quantities = contact_quantities(contact);
     Rest {
         size: (rest.sqrt()) / signal.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
+        explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
         times_noise: rest / left.max(1e-300),
         follows: follows(&residual, &rows, block, &quantities),
     }
@@ -138,15 +149,16 @@ fn follows(
     out
 }
 
-/// Of a linear balance.
-pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> Rest {
+/// Of a linear balance; `explained` is the smallest change that a named cause makes, in the response's unit.
+pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>, explained: f64) -> Rest {
     let block = (BLOCK_S / balance.row_step_s).round().max(1.0) as usize;
     let (rest, left) = structured(residual, &balance.first_deviation, &balance.used, block);
     let before = none.map_or(rest, |none| structured(none, &balance.first_deviation, &balance.used, block).0);
     let time: Vec<f64> = (0..residual.len()).map(|i| i as f64).collect();
     Rest {
-        size: rest.sqrt() / balance.rms(&balance.response).max(1e-12),
+        size: rest.sqrt() / balance.scale.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
+        explained: explained / balance.scale.max(1e-12),
         times_noise: rest / left.max(1e-300),
         follows: follows(residual, &balance.used, block, &[("time".into(), time)]),
     }

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::balance::Alternative;
+use super::balance::{Alternative, DiscMotion};
 use super::drive::{DriveLog, INERTIA};
 use super::effects::DriveView;
 use super::filters::gaussian;
@@ -145,7 +145,8 @@ fn alternative(
     Some(Alternative {
         form: format!("{:.0} Hz, gap {:.2e} rad", numbers.mode_hz, numbers.gap_rad),
         response: Some(added),
-        disc_position: Some(positions),
+        // A torque error near the mode, where it lasts longest.
+        disc: Some(DiscMotion { angle_rad: positions, speed_per_torque: 1.0 / (disc * omega) }),
         base_shift: vec![(INERTIA, -disc)],
         constants,
         log_prior: -share.ln(),

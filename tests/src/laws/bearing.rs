@@ -17,7 +17,8 @@
 //! - constant (zero of a ±10 V torque command: M. P. Kaźmierkowski, H. Tunia, *Automatic Control of Converter-Fed
 //!   Drives*, 1994);
 //! - per log: constant in each log, by 15 % (sd) another from log to log (zero taken at each power-up);
-//! - leaning: constant plus up to 15 % of it over the angle, sin(θ) (table not level, a mass off the centre);
+//! - wavering: constant plus up to 15 % of it up and down over some ten seconds (supply and temperature of the drive's
+//!   current sensor). A part over the angle would be a ripple, which is an effect of its own;
 //! - reserved, warming: grows from 70 % of its value within some seconds (drift of the current sensor's zero).
 
 use serde::Serialize;
@@ -141,7 +142,7 @@ impl Falling {
 enum Bias {
     Constant,
     PerLog,
-    Leaning { share: f64, phase_rad: f64 },
+    Wavering { share: f64, period_s: f64, phase_rad: f64 },
     Warming { time_s: f64 },
 }
 
@@ -151,7 +152,6 @@ pub struct Offset {
     #[serde(flatten)]
     bias: Bias,
     offset: f64,
-    travel: f64,
     #[serde(skip)]
     of_log: f64,
 }
@@ -163,10 +163,14 @@ impl Offset {
         let bias = match family.pick(s, &[0, 1, 2], 3) {
             0 => Bias::Constant,
             1 => Bias::PerLog,
-            2 => Bias::Leaning { share: s.uniform(0.0, 0.15), phase_rad: s.phase() },
+            2 => Bias::Wavering {
+                share: s.uniform(0.0, 0.15),
+                period_s: s.uniform(8.0, 30.0),
+                phase_rad: s.phase(),
+            },
             _ => Bias::Warming { time_s: s.uniform(1.0, 4.0) },
         };
-        Self { bias, offset, travel: units.travel, of_log: 1.0 }
+        Self { bias, offset, of_log: 1.0 }
     }
 
     pub(crate) fn begin_log(&mut self, s: &mut Stream) {
@@ -175,14 +179,16 @@ impl Offset {
         }
     }
 
-    /// Torque at a time and an angle.
+    /// Torque at a time.
     #[must_use]
-    pub fn at(&self, time_s: f64, angle: f64) -> f64 {
+    pub fn at(&self, time_s: f64) -> f64 {
         self.of_log
             * self.offset
             * match self.bias {
                 Bias::Constant | Bias::PerLog => 1.0,
-                Bias::Leaning { share, phase_rad } => 1.0 + share * (angle / self.travel + phase_rad).sin(),
+                Bias::Wavering { share, period_s, phase_rad } => {
+                    1.0 + share * (std::f64::consts::TAU * time_s / period_s + phase_rad).sin()
+                }
                 Bias::Warming { time_s: warm_s } => 1.0 - 0.3 * (-time_s / warm_s).exp(),
             }
     }

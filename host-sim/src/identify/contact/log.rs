@@ -126,13 +126,14 @@ impl ContactLog {
         })
     }
 
-    /// Replaces the disc's angle by one that is known better.
-    pub fn follow(&mut self, angle_rad: &[f64]) {
+    /// Replaces the disc's angle by one that is known better; its speed's error is in rad/s.
+    pub fn follow(&mut self, angle_rad: &[f64], speed_error: f64) {
         let step_s = self.grid.step_s;
         self.angle_rad = angle_rad.to_vec();
         self.root_m = angle_rad.iter().map(|a| self.radius_m * a).collect();
         let speed: Vec<f64> = gradient(&self.root_m).iter().map(|d| d / step_s).collect();
         self.root_speed_m_s = gaussian(&speed, 3.0, 0);
+        self.speed_noise_m_s = self.speed_noise_m_s.hypot(self.radius_m * speed_error);
     }
 
     /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.

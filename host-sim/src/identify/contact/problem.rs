@@ -27,6 +27,8 @@ const SLOWEST_SLIP: f64 = 0.015;
 const SLIP_NOISES: f64 = 4.0;
 /// Drift of the root against the measured motion, relative to its usual speed: what the elements' way differs by.
 const DRIFT: f64 = 5e-4;
+/// A sample is well known where its deviation is less than this share of the usual torque.
+const WELL_KNOWN: f64 = 0.1;
 /// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
 const SIMULATED_MODE: f64 = 0.25;
 
@@ -195,6 +197,11 @@ impl<'a> Problem<'a> {
     /// Measured values, all logs on end.
     pub fn measured(&self) -> impl Iterator<Item = f64> + '_ {
         self.logs.iter().flat_map(|log| log.friction_nm.iter().copied())
+    }
+
+    /// Deviation up to which a sample of the friction channel is well known, N m: sizes and rests are taken there.
+    pub fn well_known_nm(&self) -> f64 {
+        WELL_KNOWN * rms(&self.measured().collect::<Vec<_>>())
     }
 
     fn contact(&self, numbers: &Numbers, change: &Change) -> Contact {

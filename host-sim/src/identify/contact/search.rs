@@ -35,31 +35,25 @@ const FINALISTS: usize = 8;
 /// A larger set is looked for where each part of the smaller one changes the prediction by this share of the signal: half
 /// of what the model's form is known to.
 const WORTH: f64 = 0.5 * MODEL_FORM;
-/// Sizes are taken where the channel is known to this many deviations of its sensor's noise.
-const WELL_KNOWN: f64 = 10.0;
+/// Sets whose subsets stay in the comparison, so that what a cause adds is seen beside the same others.
+const CLOSED: usize = 3;
 
 /// How much the prediction changes, relative to the signal, when each of a set's terms is taken out and the others are
 /// fitted again.
 pub fn sizes(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
-    let counts: Vec<usize> = fit.terms.iter().map(|t| problem.terms[*t].parameters.len()).collect();
-    let base = problem.baseline.free.len();
     (0..fit.terms.len())
         .into_par_iter()
         .map(|out| {
-            let from = base + counts[..out].iter().sum::<usize>();
-            let mut p = fit.p.clone();
-            p.drain(from..from + counts[out]);
-            let mut terms = fit.terms.clone();
-            terms.remove(out);
-            let without = problem.fit(&terms, p, 8, None);
-            difference(problem, &fit.r, &without.r)
+            let left = without(problem, fit, out);
+            let left = problem.fit(&left.terms, left.p, 8, None);
+            difference(problem, &fit.r, &left.r)
         })
         .collect()
 }
 
 /// RMS of the difference of two predictions over that of the signal, where the channel is well known.
 pub fn difference(problem: &Problem<'_>, a: &[f64], b: &[f64]) -> f64 {
-    let limit = WELL_KNOWN * problem.logs.iter().map(|log| log.friction_noise_nm).fold(0.0, f64::max);
+    let limit = problem.well_known_nm();
     let (mut sum, mut count, mut signal, mut all) = (0.0, 0.0f64, 0.0, 0.0f64);
     for (((a, b), s), y) in a.iter().zip(b).zip(&problem.noise.deviation).zip(problem.measured()) {
         signal += y * y;
@@ -111,11 +105,49 @@ pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found 
         let again: Vec<Fit> =
             kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 6, None)).collect();
         ranked = rank(problem, again);
+        ranked = closed(problem, ranked);
     }
     Found { ranked }
 }
 
-fn baseline(problem: &Problem<'_>) -> Fit {
+/// With the subsets of the best sets that are missing, each fitted from where its set stood.
+fn closed(problem: &Problem<'_>, mut ranked: Vec<Ranked>) -> Vec<Ranked> {
+    for _ in 0..2 {
+        let mut missing: Vec<Fit> = Vec::new();
+        for set in ranked.iter().take(CLOSED).map(|r| &r.fit).filter(|fit| fit.terms.len() > 1) {
+            for out in 0..set.terms.len() {
+                let subset = without(problem, set, out);
+                let known = ranked.iter().map(|r| &r.fit).chain(&missing);
+                if !known.into_iter().any(|fit| same_set(&fit.terms, &subset.terms)) {
+                    missing.push(subset);
+                }
+            }
+        }
+        if missing.is_empty() {
+            break;
+        }
+        let fits: Vec<Fit> = missing.into_par_iter().map(|s| problem.fit(&s.terms, s.p, 8, None)).collect();
+        ranked = rank(problem, ranked.into_iter().map(|r| r.fit).chain(fits).collect());
+    }
+    ranked
+}
+
+fn same_set(a: &[usize], b: &[usize]) -> bool {
+    a.len() == b.len() && a.iter().all(|term| b.contains(term))
+}
+
+/// A fit with one of its terms taken out, not fitted again.
+fn without(problem: &Problem<'_>, fit: &Fit, out: usize) -> Fit {
+    let count = |term: &usize| problem.terms[*term].parameters.len();
+    let from = problem.baseline.free.len() + fit.terms[..out].iter().map(count).sum::<usize>();
+    let mut left = fit.clone();
+    left.p.drain(from..from + count(&fit.terms[out]));
+    left.terms.remove(out);
+    left
+}
+
+/// The baseline fitted without any cause.
+pub fn baseline(problem: &Problem<'_>) -> Fit {
     let start: Vec<f64> = problem.baseline.free.iter().map(|b| b.parameter.mean).collect();
     let near = problem.fit(&[], start, 6, None);
     problem.fit(&[], near.p, 6, None)
@@ -193,13 +225,7 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
             continue;
         };
         // Out with the columns, in with the law, at the end of the parameters.
-        let base = problem.baseline.free.len();
-        let from =
-            base + current.terms[..place].iter().map(|t| problem.terms[*t].parameters.len()).sum::<usize>();
-        let count = problem.terms[term].parameters.len();
-        let mut others = current.clone();
-        others.p.drain(from..from + count);
-        others.terms.remove(place);
+        let others = without(problem, &current, place);
         let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
         let starts = problem.starts(&others, law);
         let fits =

@@ -13,8 +13,6 @@ pub(super) struct M1Ripple;
 /// Most periods over the travel, and most orders at once.
 const MOST_PERIODS: usize = 60;
 const MOST_ORDERS: usize = 3;
-/// A line's power over the median of all: the press's residuals are coloured.
-const OVER_MEDIAN: f64 = 25.0;
 
 impl Effect for M1Ripple {
     fn about(&self) -> About {
@@ -45,12 +43,16 @@ impl Effect for M1Ripple {
                 }
                 continue;
             }
-            let (x, r) = waves::picked(view.balance, &positions.concat(), view.residual);
-            let travel = x.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max);
+            let position = positions.concat();
+            let travel = positions.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max);
             let candidates = waves::of_travel(travel, MOST_PERIODS);
-            let orders = waves::lines(&x, &r, &candidates, MOST_ORDERS, OVER_MEDIAN);
-            for count in 1..=orders.len() {
-                all.extend(make.alternatives(&orders[..count], 2 * candidates.len()));
+            // The position dwells at the steps of the force, where a spectrum shows all orders alike.
+            for own_phase in [false, true] {
+                let orders =
+                    waves::joint(view.balance, &position, view.residual, &candidates, MOST_ORDERS, own_phase);
+                for count in 1..=orders.len() {
+                    all.push(make.alternative(&orders[..count], candidates.len(), own_phase));
+                }
             }
         }
         all

@@ -24,7 +24,7 @@ impl Effect for RingResonance {
     fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
         let parameters = vec![Parameter::logarithm("mode_hz", 100.0, 0.6), Parameter::logarithm("damping_ratio", 0.05, 0.7)];
         // Steps of 2 %: a mode with 1 % damping is as wide.
-        let hertz = (0..120).map(|i| 22.0 * 1.02f64.powi(i)).filter(|hz| *hz < 200.0);
+        let hertz = (0..122).map(|i| 22.0 * 1.02f64.powi(i));
         let starts = hertz.flat_map(|hz| [0.012, 0.06].map(|zeta: f64| vec![hz.ln(), zeta.ln()])).collect();
         vec![ContactTerm::any(self.id(), parameters, Starts::BestOf(starts, 3), |p, change| {
             change.mode = Some(mode(p));

@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use crate::identify::balance::{Alternative, Balance};
+use crate::identify::contact::problem::FREEDOM;
+use crate::identify::linear;
 use crate::identify::term::Parameter;
 
 /// Wave numbers (radians per unit of position) at which a residual has a line, the strongest first, at most `most`.
@@ -46,6 +48,56 @@ pub fn lines(x: &[Vec<f64>], r: &[Vec<f64>], candidates: &[f64], most: usize, ov
                 *r -= c * cos + s * sin;
             });
         }
+    }
+    found
+}
+
+/// Wave numbers that together with the base columns leave least, one after the other, at most `most`: for a position that
+/// dwells at few values, where all orders look alike and only the whole balance tells them apart. With a phase for each log
+/// where `own_phase` is set.
+pub fn joint(
+    balance: &Balance,
+    position: &[f64],
+    residual: &[f64],
+    candidates: &[f64],
+    most: usize,
+    own_phase: bool,
+) -> Vec<f64> {
+    let used = &balance.used;
+    let scaled = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        used.iter().map(|&i| of(i) / balance.deviation[i]).collect()
+    };
+    let y = scaled(&|i| residual[i]);
+    let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
+    let logs = if own_phase { balance.starts.len() } else { 1 };
+    let log_of = |i: usize| balance.starts.partition_point(|start| *start <= i) - 1;
+    let waves = |k: f64| -> Vec<Vec<f64>> {
+        let own = (0..logs).flat_map(|log| [false, true].map(|sine| (log, sine)));
+        own.map(|(log, sine)| {
+            scaled(&|i| match (own_phase && log_of(i) != log, sine) {
+                (true, _) => 0.0,
+                (_, true) => (k * position[i]).sin(),
+                (_, false) => (k * position[i]).cos(),
+            })
+        })
+        .collect()
+    };
+    let mut columns: Vec<Vec<f64>> = balance.base.iter().map(|(_, column)| scaled(&|i| column[i])).collect();
+    let mut found = Vec::new();
+    for _ in 0..most {
+        let explained = |k: &f64| -> f64 {
+            let all: Vec<Vec<f64>> = columns.iter().cloned().chain(waves(*k)).collect();
+            let (mut h, g) = linear::normal_equations(&all, &weight, &y);
+            // Columns may be nearly the same where the position dwells.
+            for i in 0..h.nrows() {
+                h[(i, i)] += 1e-6 * h[(i, i)] + f64::MIN_POSITIVE;
+            }
+            g.dot(&linear::factor(&h).solve(&g))
+        };
+        let free = candidates.par_iter().filter(|k| !found.contains(*k)).map(|k| (explained(k), *k));
+        let Some((_, k)) = free.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        found.push(k);
+        columns.extend(waves(k));
     }
     found
 }
@@ -96,18 +148,16 @@ impl Waves<'_> {
         if orders.is_empty() {
             return Vec::new();
         }
-        let own = (0..self.positions.len()).map(Some).collect();
-        let forms = [("one phase", vec![None]), ("a phase for each log", own)];
-        forms.into_iter().map(|(form, logs)| self.alternative(orders, candidates, form, &logs)).collect()
+        [false, true].into_iter().map(|own| self.alternative(orders, candidates, own)).collect()
     }
 
-    fn alternative(
-        &self,
-        orders: &[f64],
-        candidates: usize,
-        form: &str,
-        logs: &[Option<usize>],
-    ) -> Alternative {
+    /// Waves of these orders, chosen among `candidates`, with one phase for all logs or one for each.
+    pub fn alternative(&self, orders: &[f64], candidates: usize, own_phase: bool) -> Alternative {
+        let (form, logs) = if own_phase {
+            ("a phase for each log", (0..self.positions.len()).map(Some).collect())
+        } else {
+            ("one phase", vec![None])
+        };
         let (mut columns, mut parameters) = (Vec::new(), Vec::new());
         for only in logs {
             let log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
