@@ -31,8 +31,6 @@ const LOG_PRIOR: f64 = -3.9;
 pub const EVIDENCE_SHARE: f64 = 0.1;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
 const SIZE_WIDTH: f64 = 0.25 / 1.7;
-/// A simulated motion of the disc is taken where it leaves less than this share of what a rigid shaft leaves.
-const TRUSTED_MOTION: f64 = 0.3;
 /// Sets of each balance that enter the table.
 const CANDIDATES: usize = 12;
 
@@ -69,6 +67,8 @@ pub struct Candidate {
     pub place: usize,
     /// Change of the prediction by each effect, relative to the signal, in the order of `effects`.
     pub sizes: Vec<f64>,
+    /// What a change has to exceed, relative to the signal: what the form of the model is known to, and what is left.
+    pub floor: f64,
 }
 
 /// A searched linear balance.
@@ -111,8 +111,8 @@ pub struct ContactPart {
 pub struct DiscCause {
     /// Its id.
     pub effect: &'static str,
-    /// Residuals of the baseline with the motion as logged, over their deviations.
-    pub residual: Vec<f64>,
+    /// Residuals of the baseline with the motion as logged, N m.
+    pub residual_nm: Vec<f64>,
 }
 
 impl ContactPart {
@@ -196,6 +196,7 @@ impl Linear {
                 log_evidence: solved.log_evidence,
                 place,
                 sizes: effects.iter().map(|e| e.1).collect(),
+                floor: MODEL_FORM.max(self.rest(place).size * self.balance.scale / self.signal.max(1e-12)),
             });
         }
         out
@@ -236,6 +237,8 @@ pub struct Hypothesis {
     pub places: Vec<(Part, usize)>,
     /// Largest change of a prediction by each effect, relative to the signal.
     pub sizes: Vec<f64>,
+    /// The same over what a change has to exceed.
+    pub over_floor: Vec<f64>,
     /// Posterior probability.
     pub probability: f64,
 }
@@ -262,9 +265,9 @@ pub struct Judgement {
     pub linear_stage: bool,
 }
 
-/// Probability that an effect of this size is real and not the form of the model.
-pub fn real(size: f64) -> f64 {
-    1.0 / (1.0 + (-(size.max(1e-9) / MODEL_FORM).ln() / SIZE_WIDTH).exp())
+/// Probability that an effect is real that is so many times as large as the form of the model and what is left.
+pub fn real(over_floor: f64) -> f64 {
+    1.0 / (1.0 + (-over_floor.max(1e-9).ln() / SIZE_WIDTH).exp())
 }
 
 /// Diagnoses training logs.
@@ -296,8 +299,17 @@ pub fn judge(
         };
         told("drive");
         drive = of_drive(&logs);
-        let as_logged = logs.clone();
-        let parted = drive.as_ref().and_then(|found| follow_disc(&mut logs, found));
+        let block = contact_baseline::has_block(model);
+        let baseline = contact_baseline::baseline(model, contact_baseline::KNOWN_WITHIN);
+        // The motion with which the baseline leaves less is the better known one.
+        let mut disc_cause = None;
+        if let Some((following, effect)) = drive.as_ref().and_then(|found| following_disc(&logs, found)) {
+            let (residual_nm, as_logged) = left_by_baseline(&logs, &baseline);
+            if left_by_baseline(&following, &baseline).1 < as_logged {
+                disc_cause = Some(DiscCause { effect, residual_nm });
+                logs = following;
+            }
+        }
         if drive.is_none() {
             notes.push("no torque of M2: the drive is not looked at".to_string());
         }
@@ -309,9 +321,7 @@ pub fn judge(
             notes.push("no torque of M1: the press is not looked at".to_string());
         }
         let scales = Scales::new(&logs);
-        let block = contact_baseline::has_block(model);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
-        let baseline = contact_baseline::baseline(model, contact_baseline::KNOWN_WITHIN);
         let (noise, ranked, ends) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, told);
@@ -325,10 +335,6 @@ pub fn judge(
             seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
             drive = of_drive(&seen);
         }
-        let disc_cause = parted.map(|effect| {
-            let before = Problem::with_noise(&as_logged, &baseline, &terms, noise.clone());
-            DiscCause { effect, residual: search::baseline(&before).r }
-        });
         contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked, disc_cause });
     } else {
         let logs = train.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
@@ -367,21 +373,28 @@ pub fn judge(
     Ok(judgement)
 }
 
-/// Lets the contact move with the disc, where the drive's best set parts it from the motor's encoder; the cause's id.
-fn follow_disc(logs: &mut [ContactLog], drive: &Linear) -> Option<&'static str> {
-    let (place, best) = (0, drive.solved.first()?);
-    let none = drive.solved.iter().find(|s| s.set.is_empty())?;
-    // A motion that leaves much of the drive's torque unexplained is no better than the encoder's.
-    if drive.balance.rms(&best.residual) > TRUSTED_MOTION * drive.balance.rms(&none.residual) {
-        return None;
-    }
-    let torque_error = drive.rest(place).size * drive.balance.scale;
+/// The logs with the disc's own motion, where the drive's best set parts it from the motor's encoder; the cause's id.
+fn following_disc(logs: &[ContactLog], drive: &Linear) -> Option<(Vec<ContactLog>, &'static str)> {
+    let best = drive.solved.first()?;
+    let torque_error = drive.rest(0).size * drive.balance.scale;
     let cause = best.set.iter().map(|a| &drive.alternatives[*a]).find(|a| a.disc.is_some())?;
     let disc = cause.disc.as_ref()?;
+    let mut logs = logs.to_vec();
     for (log, angle_rad) in logs.iter_mut().zip(&disc.angle_rad) {
         log.follow(angle_rad, disc.speed_per_torque * torque_error);
     }
-    Some(cause.effect)
+    Some((logs, cause.effect))
+}
+
+/// What the baseline leaves of these logs, over the deviations of its own noise model, and its mean square, (N m)².
+fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64) {
+    let problem = Problem::new(logs, baseline, &[]);
+    let residual_nm: Vec<f64> = {
+        let r = search::baseline(&problem).r;
+        r.iter().zip(&problem.noise.deviation).map(|(r, s)| r * s).collect()
+    };
+    let square = residual_nm.iter().map(|r| r * r).sum::<f64>() / residual_nm.len().max(1) as f64;
+    (residual_nm, square)
 }
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
@@ -398,6 +411,7 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
             log_evidence: ranked.log_evidence,
             place,
             sizes: effects.iter().map(|e| e.1).collect(),
+            floor: MODEL_FORM.max(rest::of_contact(contact, place, None).size),
         });
     }
     out
@@ -431,6 +445,7 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
         .filter_map(|effects| {
             let mut log_weight = LOG_PRIOR * effects.len() as f64;
             let mut sizes = vec![0.0f64; effects.len()];
+            let mut over_floor = vec![0.0f64; effects.len()];
             let mut places = Vec::new();
             for (part, candidates) in parts {
                 let best = within(candidates, &effects)?;
@@ -439,17 +454,19 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
                 for (effect, size) in best.effects.iter().zip(&best.sizes) {
                     let at = effects.iter().position(|e| e == effect)?;
                     sizes[at] = sizes[at].max(*size);
+                    over_floor[at] = over_floor[at].max(*size / best.floor);
                 }
             }
-            Some(Hypothesis { effects, log_weight, places, sizes, probability: 0.0 })
+            Some(Hypothesis { effects, log_weight, places, sizes, over_floor, probability: 0.0 })
         })
         .collect();
     all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
-    // An effect below the model's form is taken out of the table, the smallest first.
+    // An effect below what is known is taken out of the table, the smallest first.
     let mut too_small: Vec<(&'static str, f64)> = Vec::new();
-    while let Some((effect, size)) = all.first().and_then(|best| {
-        let pairs = best.effects.iter().copied().zip(best.sizes.iter().copied());
-        pairs.filter(|(_, size)| *size < MODEL_FORM).min_by(|a, b| a.1.total_cmp(&b.1))
+    while let Some((effect, _, size)) = all.first().and_then(|best| {
+        let sizes = best.over_floor.iter().zip(&best.sizes);
+        let each = best.effects.iter().zip(sizes).map(|(effect, (over, size))| (*effect, *over, *size));
+        each.filter(|(_, over, _)| *over < 1.0).min_by(|a, b| a.1.total_cmp(&b.1))
     }) {
         too_small.push((effect, size));
         all.retain(|h| !h.effects.contains(&effect));
@@ -458,7 +475,8 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
     let top = all.first().map_or(0.0, |h| h.log_weight);
     let mut mass = 0.0;
     for h in &mut all {
-        h.probability = (h.log_weight - top).exp() * h.sizes.iter().map(|s| real(*s)).product::<f64>();
+        h.probability =
+            (h.log_weight - top).exp() * h.over_floor.iter().map(|over| real(*over)).product::<f64>();
         mass += h.probability;
     }
     all.iter_mut().for_each(|h| h.probability /= mass.max(1e-300));

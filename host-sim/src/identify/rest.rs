@@ -59,12 +59,16 @@ fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> 
 pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscCause>) -> Rest {
     let problem = contact.problem();
     let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit.r);
-    let mut explained = search::sizes(&problem, contact.fit(place));
-    if let (Some(cause), Some(none)) = (disc_cause, none) {
-        explained.push(search::difference(&problem, none, &cause.residual));
-    }
-    let none = disc_cause.map(|cause| &cause.residual).or(none);
     let fit = contact.fit(place);
+    let as_logged = disc_cause.map(|cause| {
+        let over = cause.residual_nm.iter().zip(&problem.noise.deviation).zip(&fit.r);
+        over.map(|((r, s), used)| if *used == 0.0 { 0.0 } else { r / s }).collect::<Vec<f64>>()
+    });
+    let mut explained = search::sizes(&problem, fit);
+    if let (Some(as_logged), Some(none)) = (&as_logged, none) {
+        explained.push(search::difference(&problem, none, as_logged));
+    }
+    let none = as_logged.as_ref().or(none);
     let limit = problem.well_known_nm();
     let deviation = &problem.noise.deviation;
     let rows: Vec<usize> =
