@@ -399,6 +399,7 @@ fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64)
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
     let problem = contact.problem();
+    let ground = rest::Ground::new(contact);
     let mut out = Vec::new();
     for (place, ranked) in contact.ranked.iter().enumerate() {
         let fit = &ranked.fit;
@@ -411,7 +412,7 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
             log_evidence: ranked.log_evidence,
             place,
             sizes: effects.iter().map(|e| e.1).collect(),
-            floor: MODEL_FORM.max(rest::of_contact(contact, place, None).size),
+            floor: MODEL_FORM.max(ground.size(&fit.r)),
         });
     }
     out

@@ -3,6 +3,7 @@
 use super::balance::Balance;
 use super::contact::noise::MODEL_FORM;
 use super::contact::search;
+use super::filters::rms;
 use super::judge::{ContactPart, DiscCause};
 
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts.
@@ -55,6 +56,47 @@ fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> 
     ((sum / count - left / count).max(0.0), left / count)
 }
 
+/// What the rests of the contact's balance are measured with.
+pub struct Ground {
+    /// Deviations of the noise model, N m.
+    deviation: Vec<f64>,
+    /// The sensor's alone, N m.
+    noise: Vec<f64>,
+    /// Samples that are well known.
+    rows: Vec<usize>,
+    /// Samples in a block.
+    block: usize,
+    /// RMS of the channel, N m.
+    signal: f64,
+}
+
+impl Ground {
+    /// Of a searched contact.
+    pub fn new(contact: &ContactPart) -> Self {
+        let problem = contact.problem();
+        let limit = problem.well_known_nm();
+        let deviation = problem.noise.deviation.clone();
+        let used = &contact.ranked[0].fit.r;
+        let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
+        Self {
+            rows: (0..deviation.len()).filter(|i| deviation[*i] < limit && used[*i] != 0.0).collect(),
+            noise: contact.logs.iter().flat_map(|log| vec![log.friction_noise_nm; log.len()]).collect(),
+            signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
+            block: (BLOCK_S / step_s).round().max(1.0) as usize,
+            deviation,
+        }
+    }
+
+    fn in_units(&self, r: &[f64]) -> Vec<f64> {
+        r.iter().zip(&self.deviation).map(|(r, s)| r * s).collect()
+    }
+
+    /// RMS of what residuals (over their deviations) have beyond noise, over that of the signal.
+    pub fn size(&self, r: &[f64]) -> f64 {
+        structured(&self.in_units(r), &self.noise, &self.rows, self.block).0.sqrt() / self.signal
+    }
+}
+
 /// Of the contact's balance; `disc_cause` where the hypothesis has it.
 pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscCause>) -> Rest {
     let problem = contact.problem();
@@ -68,27 +110,20 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
     if let (Some(as_logged), Some(none)) = (&as_logged, none) {
         explained.push(search::difference(&problem, none, as_logged));
     }
-    let none = as_logged.as_ref().or(none);
-    let limit = problem.well_known_nm();
-    let deviation = &problem.noise.deviation;
-    let rows: Vec<usize> =
-        (0..deviation.len()).filter(|i| deviation[*i] < limit && fit.r[*i] != 0.0).collect();
-    let in_units = |r: &[f64]| r.iter().zip(deviation).map(|(r, s)| r * s).collect::<Vec<f64>>();
-    let noise: Vec<f64> =
-        contact.logs.iter().flat_map(|log| vec![log.friction_noise_nm; log.len()]).collect();
-    let signal = (problem.measured().map(|y| y * y).sum::<f64>() / deviation.len().max(1) as f64).sqrt();
-    let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
-    let block = (BLOCK_S / step_s).round().max(1.0) as usize;
-    let residual = in_units(&fit.r);
-    let (rest, left) = structured(&residual, &noise, &rows, block);
-    let before = none.map_or(rest, |none| structured(&in_units(none), &noise, &rows, block).0);
-    let quantities = contact_quantities(contact);
+    let ground = Ground::new(contact);
+    let (rows, block) = (&ground.rows, ground.block);
+    let residual = ground.in_units(&fit.r);
+    let (rest, left) = structured(&residual, &ground.noise, rows, block);
+    let before = as_logged
+        .as_ref()
+        .or(none)
+        .map_or(rest, |none| structured(&ground.in_units(none), &ground.noise, rows, block).0);
     Rest {
-        size: (rest.sqrt()) / signal.max(1e-12),
+        size: rest.sqrt() / ground.signal,
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
         times_noise: rest / left.max(1e-300),
-        follows: follows(&residual, &rows, block, &quantities),
+        follows: follows(&residual, rows, block, &contact_quantities(contact)),
     }
 }
 

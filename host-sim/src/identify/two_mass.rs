@@ -7,18 +7,26 @@
 
 use rayon::prelude::*;
 
-use super::balance::{Alternative, DiscMotion};
+use super::balance::{Alternative, DiscMotion, Solved};
+use super::contact::problem::FREEDOM;
 use super::drive::{DriveLog, INERTIA};
 use super::effects::DriveView;
 use super::filters::gaussian;
+use super::linear;
 use super::term::Parameter;
 
 /// Steps within a sample: a mode of 150 Hz turns by 0.06 rad in one.
 const SUBSTEPS: usize = 16;
 /// Pull towards the observed shaft torque, per sample.
 const PULL: f64 = 0.05;
-/// Rounds in which the best shape's neighbours are tried, the distance halved each time.
-const ROUNDS: usize = 4;
+/// Points of the grid from which a fit starts, its iterations, and step and longest move of the logarithms.
+const STARTS: usize = 3;
+const ITERATIONS: usize = 12;
+const STEP: f64 = 0.01;
+const REACH: f64 = 0.4;
+/// ln of the prior probability of one shape: the numbers are known within a factor of some ten, and fitted within a few
+/// per cent.
+const SHAPE: f64 = -10.0;
 /// Modes that the balance's filter lets through, Hz.
 const HERTZ: [f64; 2] = [4.0, 150.0];
 
@@ -102,7 +110,6 @@ fn alternative(
     view: &DriveView<'_>,
     numbers: &TwoMass,
     bearing: &[f64],
-    share: f64,
 ) -> Option<Alternative> {
     let n = numbers;
     let allowed = (HERTZ[0]..HERTZ[1]).contains(&n.mode_hz)
@@ -149,12 +156,12 @@ fn alternative(
         disc: Some(DiscMotion { angle_rad: positions, speed_per_torque: 1.0 / (disc * omega) }),
         base_shift: vec![(INERTIA, -disc)],
         constants,
-        log_prior: -share.ln(),
+        log_prior: SHAPE,
         ..Alternative::columns(effect, Vec::<Parameter>::new(), Vec::new())
     })
 }
 
-/// The best shapes of a coupling: a coarse grid, then neighbours of the best one.
+/// The best shape of a coupling: a coarse grid, then a fit from its best points.
 pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMass>) -> Vec<Alternative> {
     if !view.rotary || view.inertia <= 0.0 {
         return Vec::new();
@@ -166,44 +173,99 @@ pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMas
         let numbers =
             TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
         let bearing = view.balance.bearing(view.residual);
-        return alternative(effect, view, &numbers, &bearing, 1.0).into_iter().collect();
+        return alternative(effect, view, &numbers, &bearing).into_iter().collect();
     }
     // What the base alone makes of the bearing.
     let bearing = view.balance.bearing(view.residual);
-    let share = grid.len() as f64 * 3f64.powi(ROUNDS as i32);
-    let mut best: Option<(f64, TwoMass, Alternative)> = None;
-    let mut wave = grid;
-    let mut ratio = 1.4;
-    for _ in 0..=ROUNDS {
-        let tried: Vec<(f64, TwoMass, Alternative)> = wave
-            .par_iter()
-            .filter_map(|numbers| {
-                let one = alternative(effect, view, numbers, &bearing, share)?;
-                let evidence = view.balance.solve(std::slice::from_ref(&one), &[0]).log_evidence;
-                Some((evidence, *numbers, one))
-            })
-            .collect();
-        for found in tried {
-            if best.as_ref().is_none_or(|b| found.0 > b.0) {
-                best = Some(found);
-            }
-        }
-        let Some((_, n, _)) = best else { return Vec::new() };
-        wave = [ratio, 1.0 / ratio]
-            .into_iter()
-            .flat_map(|f| {
-                let mut near = vec![
-                    TwoMass { mode_hz: n.mode_hz * f, ..n },
-                    TwoMass { damping_ratio: n.damping_ratio * f * f, ..n },
-                    TwoMass { disc_share: (n.disc_share * f.sqrt()).clamp(0.1, 0.89), ..n },
-                ];
-                if n.gap_rad > 0.0 {
-                    near.push(TwoMass { gap_rad: n.gap_rad * f, ..n });
-                }
-                near
-            })
-            .collect();
-        ratio = ratio.sqrt();
+    let trial = |numbers: &TwoMass| -> Option<Trial> {
+        let alternative = alternative(effect, view, numbers, &bearing)?;
+        let solved = view.balance.solve(std::slice::from_ref(&alternative), &[0]);
+        Some(Trial { numbers: *numbers, alternative, solved })
+    };
+    let mut tried: Vec<Trial> = grid.par_iter().filter_map(trial).collect();
+    tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
+    tried.truncate(STARTS);
+    let refined = tried.into_iter().map(|start| refined(view, start, &trial));
+    let best = refined.max_by(|a, b| a.solved.log_evidence.total_cmp(&b.solved.log_evidence));
+    best.map(|best| best.alternative).into_iter().collect()
+}
+
+/// A coupling with what the balance makes of it.
+struct Trial {
+    numbers: TwoMass,
+    alternative: Alternative,
+    solved: Solved,
+}
+
+impl TwoMass {
+    /// What is fitted: logarithms, so that a step is a ratio.
+    fn logarithms(&self) -> Vec<f64> {
+        let n = [self.mode_hz, self.damping_ratio, self.disc_share, self.gap_rad];
+        n.iter().take(if self.gap_rad > 0.0 { 4 } else { 3 }).map(|n| n.ln()).collect()
     }
-    best.map(|(_, _, one)| one).into_iter().collect()
+
+    fn of_logarithms(p: &[f64]) -> Self {
+        Self {
+            mode_hz: p[0].exp(),
+            damping_ratio: p[1].exp(),
+            disc_share: p[2].exp(),
+            gap_rad: p.get(3).map_or(0.0, |gap| gap.exp()),
+        }
+    }
+}
+
+/// Gauss–Newton with damping on the logarithms; the base parameters are solved for each trial (variable projection).
+fn refined(view: &DriveView<'_>, start: Trial, trial: &(dyn Fn(&TwoMass) -> Option<Trial> + Sync)) -> Trial {
+    let balance = view.balance;
+    let scaled = |solved: &Solved| -> Vec<f64> {
+        balance.used.iter().map(|&i| solved.residual[i] / balance.deviation[i]).collect()
+    };
+    let mut best = start;
+    let mut damping = 1e-2;
+    for _ in 0..ITERATIONS {
+        let p = best.numbers.logarithms();
+        let r = scaled(&best.solved);
+        let columns: Option<Vec<Vec<f64>>> = (0..p.len())
+            .into_par_iter()
+            .map(|i| {
+                let moved = |step: f64| {
+                    let mut q = p.clone();
+                    q[i] += step;
+                    let there = trial(&TwoMass::of_logarithms(&q))?;
+                    Some(scaled(&there.solved).iter().zip(&r).map(|(a, b)| (b - a) / step).collect())
+                };
+                // At the end of what is allowed the other way.
+                moved(STEP).or_else(|| moved(-STEP))
+            })
+            .collect();
+        let Some(columns) = columns else { break };
+        let weights: Vec<f64> =
+            r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
+        let (h, g) = linear::normal_equations(&columns, &weights, &r);
+        let mut better = None;
+        for _ in 0..4 {
+            let mut damped = h.clone();
+            for i in 0..p.len() {
+                damped[(i, i)] += damping * h[(i, i)] + f64::MIN_POSITIVE;
+            }
+            let d = linear::factor(&damped).solve(&g);
+            let excess = d.amax().max(REACH) / REACH;
+            let q: Vec<f64> = p.iter().zip(d.iter()).map(|(p, d)| p + d / excess).collect();
+            let there = trial(&TwoMass::of_logarithms(&q));
+            better = there.filter(|t| t.solved.log_evidence > best.solved.log_evidence);
+            if better.is_some() {
+                break;
+            }
+            damping *= 10.0;
+        }
+        let Some(better) = better else { break };
+        let gained = better.solved.log_evidence - best.solved.log_evidence;
+        best = better;
+        damping = (0.3 * damping).max(1e-4);
+        // Half a unit of log evidence changes no decision.
+        if gained < 0.5 {
+            break;
+        }
+    }
+    best
 }
