@@ -23,8 +23,10 @@ const STANDSTILL: f64 = 0.01;
 const STANDSTILL_NOISES: f64 = 5.0;
 /// Rows are taken every so many samples for each width of the filter: closer ones say the same.
 const ROWS_PER_WIDTH: f64 = 0.5;
-/// The channels of a log are sampled within this time of each other, s.
-const LATE_S: f64 = 1e-4;
+/// The channels of a log are sampled within this time of each other, s: a converter's scan.
+const SCAN_S: f64 = 3e-5;
+/// The friction bridge's delay is known within this time by the rig file, s.
+const BRIDGE_LATE_S: f64 = 2e-4;
 /// Gain of the friction channel is known within 0.5 %.
 const GAIN: f64 = 5e-3;
 /// Names of the base parameters' places.
@@ -58,7 +60,7 @@ pub struct DriveLog {
 }
 
 impl DriveLog {
-    /// From a drive log.
+    /// From a drive log; the filter is as narrow as the angle's noise allows for this inertia.
     ///
     /// # Errors
     /// Where a column is missing.
@@ -233,13 +235,13 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
             concat(&|log| log.speed.clone()),
         ),
         (
-            wide("effort_late_s", 0.0, LATE_S),
+            wide("effort_late_s", 0.0, SCAN_S),
             concat(&|log| rate(log, &log.effort).iter().map(|d| -d).collect()),
         ),
     ];
     if contact {
         let friction = |log: &DriveLog| log.friction.clone().unwrap_or_else(|| vec![0.0; log.len()]);
-        base.push((wide("friction_late_s", 0.0, 2.0 * LATE_S), concat(&|log| rate(log, &friction(log)))));
+        base.push((wide("friction_late_s", 0.0, BRIDGE_LATE_S), concat(&|log| rate(log, &friction(log)))));
         base.push((wide("friction_gain", 0.0, GAIN), concat(&|log| log.filtered(&friction(log)))));
     }
     let mut deviation = Vec::new();
@@ -261,7 +263,9 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
             let n = [filtered_noise, 2e-3 * own, 0.1 * effort_change[i], 0.1 * friction_change[i]];
             deviation.push(n.iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12));
         }
-        let speed_noise = noise::standard_deviation(&log.position) / (log.grid.step_s * log.width);
+        // What the derivative of a Gaussian lets through of white noise.
+        let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
+        let speed_noise = noise::standard_deviation(&log.position) * passes / log.grid.step_s;
         let standstill = (STANDSTILL * v).max(STANDSTILL_NOISES * speed_noise);
         let stands: Vec<f64> = (0..log.len())
             .map(|i| f64::from(u8::from(log.speed[i].abs() < standstill || !log.usable[i])))

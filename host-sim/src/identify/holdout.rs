@@ -125,7 +125,9 @@ pub fn errors(
             out.push((Part::Pressure, press_errors(found, press, &presses, &names, rig, training)));
         }
     } else if let Some(drive) = &found.drive {
-        let drives = logs.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
+        // Through the filter of the training logs.
+        let inertia = drive.solved.iter().find(|s| s.set.is_empty()).map_or(0.0, |s| s.p[drive::INERTIA]);
+        let drives = logs.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
         out.push((Part::Drive, drive_errors(found, drive, &drives, None, training)));
     }
     Ok(out)

@@ -6,10 +6,10 @@
 
 use super::balance::{self, Alternative, Balance, Solved};
 use super::contact::baseline as contact_baseline;
-use super::contact::change::ContactTerm;
+use super::contact::change::{Change, ContactTerm};
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
-use super::contact::problem::{Baseline, Fit, Noise, Problem};
+use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
@@ -121,6 +121,22 @@ impl ContactPart {
         Problem::with_noise(&self.logs, &self.baseline, &self.terms, self.noise.clone())
     }
 
+    /// What an effect changes in a candidate, and the contact's numbers there.
+    pub fn change_by(&self, place: usize, effect: &str) -> Option<(Change, Numbers)> {
+        let fit = self.fit(place);
+        let mut at = self.baseline.free.len();
+        for term in fit.terms.iter().map(|t| &self.terms[*t]) {
+            let values = &fit.p[at..at + term.parameters.len()];
+            if term.effect == effect {
+                let mut change = Change::default();
+                (term.act)(values, &mut change);
+                return Some((change, self.baseline.numbers(&fit.p)));
+            }
+            at += term.parameters.len();
+        }
+        None
+    }
+
     /// The fit of a candidate.
     pub fn fit(&self, place: usize) -> &Fit {
         &self.ranked[place].fit
@@ -159,6 +175,17 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
     let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
     let signal = balance.rms(&balance.response);
     Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), press_scales: None }
+}
+
+/// Inertia or mass by a first balance through the widest filter: it says how narrow the filter may be.
+///
+/// # Errors
+/// Where a column is missing.
+pub fn drive_inertia(logs: &[Log]) -> Result<f64, InputError> {
+    let logs = logs.iter().map(|log| DriveLog::new(log, f64::INFINITY)).collect::<Result<Vec<_>, _>>()?;
+    let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
+    let balance = drive::balance(&logs, &nothing, &DriveScales::new(&logs));
+    Ok(balance.solve(&[], &[]).p[drive::INERTIA].max(0.0))
 }
 
 /// The press's balance of these logs, searched.
@@ -337,7 +364,8 @@ pub fn judge(
         }
         contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked, disc_cause });
     } else {
-        let logs = train.iter().map(|log| DriveLog::new(log, 0.0)).collect::<Result<Vec<_>, _>>()?;
+        let inertia = drive_inertia(train)?;
+        let logs = train.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
         told("drive");
         drive = Some(search_drive(
             &logs,

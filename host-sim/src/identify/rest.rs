@@ -91,6 +91,11 @@ impl Ground {
         r.iter().zip(&self.deviation).map(|(r, s)| r * s).collect()
     }
 
+    #[allow(missing_docs)]
+    pub fn short(&self, r: &[f64]) -> f64 {
+        structured(&self.in_units(r), &self.noise, &self.rows, (self.block / 10).max(1)).0.sqrt()
+            / self.signal
+    }
     /// RMS of what residuals (over their deviations) have beyond noise, over that of the signal.
     pub fn size(&self, r: &[f64]) -> f64 {
         structured(&self.in_units(r), &self.noise, &self.rows, self.block).0.sqrt() / self.signal

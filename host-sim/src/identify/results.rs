@@ -295,6 +295,10 @@ fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Ca
             percent(size)
         ));
     }
+    if let (Some(contact), Some(place)) = (&judged.contact, judged.place(Part::Friction)) {
+        let remark = LIBRARY.iter().find(|e| e.id() == id).and_then(|e| e.remark(contact, place));
+        evidence.extend(remark);
+    }
     let without = judged.hypotheses.iter().find(|h| !h.effects.contains(&id));
     if let Some(without) = without {
         evidence.push(format!(

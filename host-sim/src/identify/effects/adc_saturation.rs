@@ -7,6 +7,8 @@ use crate::identify::term::{Parameter, Starts};
 /// The effect.
 pub(super) struct AdcSaturation;
 
+/// Share of samples that are spikes at most.
+const SPIKES: f64 = 1e-3;
 /// A clipped end holds at least this share of a channel's samples, …
 const LEAST_SHARE: f64 = 0.004;
 /// … within so many deviations of the noise on either side of it.
@@ -17,7 +19,8 @@ fn end(values: &mut [f64], noise: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();
     let band = 2.0 * EDGE_NOISES * noise;
-    let top = *values.last()?;
+    // A few samples stand above an end: spikes on the line behind what clips.
+    let top = *values.get(((1.0 - SPIKES) * n as f64) as usize)?;
     let above = |level: f64| n - values.partition_point(|x| *x < level);
     let (last, two) = (above(top - band), above(top - 2.0 * band));
     (last as f64 > LEAST_SHARE * n as f64 && last > 3 * (two - last)).then(|| values[n - last / 2 - 1])

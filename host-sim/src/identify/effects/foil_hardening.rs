@@ -22,7 +22,9 @@ impl Effect for FoilHardening {
             let of = |log: &super::PressLog| log.filtered_n.iter().map(|x| (x.max(0.0) / s.load_n).powi(n)).collect::<Vec<f64>>();
             view.logs.iter().flat_map(of).collect()
         };
-        let parameters = ["square_nm", "cube_nm"].map(|name| Parameter::amplitude(name, s.torque_nm)).to_vec();
-        vec![Alternative::columns(self.id(), parameters, vec![power(2), power(3)])]
+        // Up to a bend as sharp as that of a second leaf.
+        let names = ["square_nm", "cube_nm", "fourth_power_nm", "fifth_power_nm"];
+        let parameters = names.map(|name| Parameter::amplitude(name, s.torque_nm)).to_vec();
+        vec![Alternative::columns(self.id(), parameters, (2..6).map(power).collect())]
     }
 }

@@ -7,7 +7,11 @@ use model_core::extension::load_dependence::LoadDependence as Law;
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
+use crate::identify::judge::ContactPart;
 use crate::identify::term::{Parameter, Starts};
+
+/// Loads below this share of the usual one do not count for the affine law.
+const LEAST_LOAD: f64 = 0.05;
 
 /// The effect.
 pub(super) struct LoadDependence;
@@ -47,5 +51,29 @@ impl Effect for LoadDependence {
             ContactTerm::factor(self.id(), "", columns, parameters),
             law.exported(move |p, _| names.iter().map(ToString::to_string).zip(values(p)).collect()),
         ]
+    }
+
+    fn remark(&self, contact: &ContactPart, place: usize) -> Option<String> {
+        let (change, numbers) = contact.change_by(place, self.id())?;
+        let factor = change.log_factor?;
+        // Friction at the Coulomb coefficient over the load, and the line through it.
+        let points = contact.logs.iter().zip(&factor).flat_map(|(log, m)| {
+            log.load_n.iter().zip(m).map(|(n, m)| (*n, numbers.a0 * n * m.exp()))
+        });
+        let points: Vec<(f64, f64)> =
+            points.filter(|(n, _)| *n > LEAST_LOAD * contact.scales.load_n).collect();
+        let count = points.len() as f64;
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count.max(1.0);
+        let (load, force) = (mean(&|p| p.0), mean(&|p| p.1));
+        let slope = mean(&|p| (p.0 - load) * (p.1 - force)) / mean(&|p| (p.0 - load).powi(2)).max(1e-12);
+        let without_load = force - slope * load;
+        let off = mean(&|p| (p.1 - without_load - slope * p.0).powi(2)).sqrt() / force.abs().max(1e-12);
+        let (low, high) =
+            points.iter().fold((f64::INFINITY, 0.0f64), |(low, high), p| (low.min(p.0), high.max(p.0)));
+        Some(format!(
+            "from {low:.0} to {high:.0} N the Coulomb force is nearest to the affine law {without_load:.2} N without load \
+             (adhesion) and {slope:.3} N per N, from which it differs by {:.1} % RMS",
+            100.0 * off
+        ))
     }
 }

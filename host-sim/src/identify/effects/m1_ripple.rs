@@ -10,6 +10,8 @@ use crate::identify::balance::Alternative;
 /// The effect.
 pub(super) struct M1Ripple;
 
+/// Fewer periods over the travel are a spring's law as well as a ripple.
+const LEAST_PERIODS: f64 = 1.7;
 /// Most periods over the travel, and most orders at once.
 const MOST_PERIODS: usize = 60;
 const MOST_ORDERS: usize = 3;
@@ -45,7 +47,8 @@ impl Effect for M1Ripple {
             }
             let position = positions.concat();
             let travel = positions.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max);
-            let candidates = waves::of_travel(travel, MOST_PERIODS);
+            let mut candidates = waves::of_travel(travel, MOST_PERIODS);
+            candidates.retain(|k| k * travel > LEAST_PERIODS * std::f64::consts::TAU);
             // The position dwells at the steps of the force, where a spectrum shows all orders alike.
             for own_phase in [false, true] {
                 let orders =

@@ -7,6 +7,7 @@ use crate::identify::balance::{Alternative, Balance};
 use crate::identify::contact::change::{Change, ContactTerm};
 use crate::identify::contact::log::ContactLog;
 use crate::identify::drive::{DriveLog, DriveScales};
+use crate::identify::judge::ContactPart;
 use crate::identify::press::{PressLog, PressScales};
 use coordinates::Coordinates;
 
@@ -100,6 +101,11 @@ pub trait Effect: Sync {
     /// What it changes in the contact's balance, in one or more forms.
     fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
         Vec::new()
+    }
+
+    /// What its fitted law says beyond its parameters, as a clause with units.
+    fn remark(&self, _contact: &ContactPart, _place: usize) -> Option<String> {
+        None
     }
 
     /// Its columns in the drive's balance, one entry for each shape.
