@@ -17,6 +17,8 @@ use crate::input_error::InputError;
 
 /// Widths of the filter that are tried, samples.
 const WIDTHS: [f64; 6] = [1.5, 2.0, 3.0, 4.0, 6.0, 9.0];
+/// Where the angle's noise asks for more than this width, its noise is borne instead, samples.
+const WIDE_ENOUGH: f64 = 4.0;
 /// The drive stands where it is slower than this share of its usual speed, …
 const STANDSTILL: f64 = 0.01;
 /// … or than so many deviations of the speed's noise.
@@ -57,6 +59,8 @@ pub struct DriveLog {
     pub acceleration: Vec<f64>,
     /// Width of the filter, samples.
     pub width: f64,
+    /// Noise of the inertial torque behind the filter.
+    pub inertial_noise: f64,
 }
 
 impl DriveLog {
@@ -106,21 +110,36 @@ impl DriveLog {
     ) -> Self {
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
         let (angle_noise, effort_noise) =
-            (noise::standard_deviation(&position), noise::standard_deviation(&effort));
+            (noise::white_deviation(&position), noise::white_deviation(&effort));
         let root_pi = std::f64::consts::PI.sqrt();
-        let fits = |width: f64| {
-            let acceleration = angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2);
-            inertia * acceleration < 0.5 * effort_noise * (0.5 / (root_pi * width)).sqrt()
+        let inertial = |width: f64| {
+            inertia * angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2)
         };
-        let width = WIDTHS.into_iter().find(|w| fits(*w)).unwrap_or(WIDTHS[5]).max(if friction.is_some() {
-            3.0
+        let fits = |width: &f64| inertial(*width) < 0.5 * effort_noise * (0.5 / (root_pi * width)).sqrt();
+        let (narrowest, widest) = (if friction.is_some() { WIDTHS[2] } else { WIDTHS[0] }, WIDTHS[5]);
+        let (width, inertial_noise) = if inertia.is_finite() {
+            // A wider one would take out what ripples; what the acceleration's noise then makes is a noise of its own.
+            let width = WIDTHS.into_iter().find(fits).unwrap_or(WIDE_ENOUGH).max(narrowest);
+            (width, inertial(width))
         } else {
-            0.0
-        });
+            (widest, 0.0)
+        };
         let dt = grid.step_s;
         let speed = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
         let acceleration = gaussian(&position, width, 2).iter().map(|d| d / (dt * dt)).collect();
-        Self { source, grid, effort, position, friction, load_n, usable, speed, acceleration, width }
+        Self {
+            source,
+            grid,
+            effort,
+            position,
+            friction,
+            load_n,
+            usable,
+            speed,
+            acceleration,
+            width,
+            inertial_noise,
+        }
     }
 
     /// Points of the grid.
@@ -256,16 +275,22 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         };
         let effort_change = change(&log.effort);
         let friction_change = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| change(f));
-        let white = noise::standard_deviation(&log.effort)
-            .hypot(log.friction.as_ref().map_or(0.0, |f| noise::standard_deviation(f)));
+        let white = noise::white_deviation(&log.effort)
+            .hypot(log.friction.as_ref().map_or(0.0, |f| noise::white_deviation(f)));
         let filtered_noise = white * (0.5 / (std::f64::consts::PI.sqrt() * log.width)).sqrt();
         for i in 0..log.len() {
-            let n = [filtered_noise, 2e-3 * own, 0.1 * effort_change[i], 0.1 * friction_change[i]];
+            let n = [
+                filtered_noise,
+                log.inertial_noise,
+                2e-3 * own,
+                0.1 * effort_change[i],
+                0.1 * friction_change[i],
+            ];
             deviation.push(n.iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12));
         }
         // What the derivative of a Gaussian lets through of white noise.
         let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
-        let speed_noise = noise::standard_deviation(&log.position) * passes / log.grid.step_s;
+        let speed_noise = noise::white_deviation(&log.position) * passes / log.grid.step_s;
         let standstill = (STANDSTILL * v).max(STANDSTILL_NOISES * speed_noise);
         let stands: Vec<f64> = (0..log.len())
             .map(|i| f64::from(u8::from(log.speed[i].abs() < standstill || !log.usable[i])))

@@ -21,16 +21,18 @@ use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 
-/// Sets of effects in the drive's and in the press's balance have at most so many.
-const MOST_AT_ONCE: usize = 2;
 /// A hypothesis has at most so many causes: more are no explanation but a fit, and what they would explain is left as it is.
 const MOST_CAUSES: usize = 3;
 /// ln of the prior probability that an effect of the library acts: one in fifty.
 const LOG_PRIOR: f64 = -3.9;
 /// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
 pub const EVIDENCE_SHARE: f64 = 0.1;
+/// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
+const LEFT_SHARE: f64 = 0.5;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
 const SIZE_WIDTH: f64 = 0.25 / 1.7;
+/// Hypotheses below this probability say nothing of what is unknown.
+const LEAST_PROBABILITY: f64 = 0.02;
 /// Sets of each balance that enter the table.
 const CANDIDATES: usize = 12;
 
@@ -172,7 +174,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
         fixed: None,
     };
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.drive(&view)).collect();
-    let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
+    let solved = balance::search(&mut balance, &alternatives, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
     Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), press_scales: None }
 }
@@ -195,7 +197,7 @@ pub fn search_press(logs: &[PressLog], rig: &RigFile) -> Linear {
     let base = balance.solve(&[], &[]);
     let view = PressView { logs, scales: &scales, balance: &balance, residual: &base.residual, fixed: None };
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.press(&view)).collect();
-    let solved = balance::search(&mut balance, &alternatives, MOST_AT_ONCE);
+    let solved = balance::search(&mut balance, &alternatives, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
     Linear { balance, alternatives, solved, signal, drive_scales: None, press_scales: Some(scales) }
 }
@@ -223,7 +225,8 @@ impl Linear {
                 log_evidence: solved.log_evidence,
                 place,
                 sizes: effects.iter().map(|e| e.1).collect(),
-                floor: MODEL_FORM.max(self.rest(place).size * self.balance.scale / self.signal.max(1e-12)),
+                floor: MODEL_FORM
+                    .max(LEFT_SHARE * self.rest(place).size * self.balance.scale / self.signal.max(1e-12)),
             });
         }
         out
@@ -396,8 +399,7 @@ pub fn judge(
         notes,
         linear_stage,
     };
-    judgement.rests = judgement.rests();
-    judgement.unknown = judgement.rests.iter().map(|(_, rest)| rest.unknown()).fold(0.0, f64::max);
+    judgement.weigh_rests();
     Ok(judgement)
 }
 
@@ -440,7 +442,7 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
             log_evidence: ranked.log_evidence,
             place,
             sizes: effects.iter().map(|e| e.1).collect(),
-            floor: MODEL_FORM.max(ground.size(&fit.r)),
+            floor: MODEL_FORM.max(LEFT_SHARE * ground.size(&fit.r)),
         });
     }
     out
@@ -550,14 +552,36 @@ impl Judgement {
         self.best().places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place)
     }
 
-    fn rests(&self) -> Vec<(Part, Rest)> {
+    /// The probability that what a hypothesis leaves is something unknown is that of all hypotheses, each with its own.
+    fn weigh_rests(&mut self) {
+        let mut weighed: Vec<(f64, Hypothesis, Vec<(Part, Rest)>)> = Vec::new();
+        for h in std::mem::take(&mut self.hypotheses) {
+            let rests = if h.probability > LEAST_PROBABILITY { self.rests_of(&h) } else { Vec::new() };
+            let unknown = rests.iter().map(|(_, rest)| rest.unknown()).fold(0.0, f64::max);
+            weighed.push((unknown, h, rests));
+        }
+        self.unknown = weighed.iter().map(|(unknown, h, _)| unknown * h.probability).sum::<f64>().min(1.0);
+        if self.unknown < 0.5 {
+            for (unknown, h, _) in &mut weighed {
+                h.probability *= (1.0 - *unknown) / (1.0 - self.unknown);
+            }
+        }
+        weighed.sort_by(|a, b| b.1.probability.total_cmp(&a.1.probability));
+        if let Some((_, _, rests)) = weighed.first_mut() {
+            self.rests = std::mem::take(rests);
+        }
+        self.hypotheses = weighed.into_iter().map(|(_, h, _)| h).collect();
+    }
+
+    fn rests_of(&self, hypothesis: &Hypothesis) -> Vec<(Part, Rest)> {
+        let place = |part: Part| hypothesis.places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place);
         let mut out = Vec::new();
-        if let (Some(contact), Some(place)) = (&self.contact, self.place(Part::Friction)) {
-            let disc_cause = contact.disc_cause.as_ref().filter(|c| self.best().effects.contains(&c.effect));
+        if let (Some(contact), Some(place)) = (&self.contact, place(Part::Friction)) {
+            let disc_cause = contact.disc_cause.as_ref().filter(|c| hypothesis.effects.contains(&c.effect));
             out.push((Part::Friction, rest::of_contact(contact, place, disc_cause)));
         }
         for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.press)] {
-            if let (Some(linear), Some(place)) = (linear, self.place(part)) {
+            if let (Some(linear), Some(place)) = (linear, place(part)) {
                 out.push((part, linear.rest(place)));
             }
         }

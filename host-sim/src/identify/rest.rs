@@ -5,9 +5,10 @@ use super::contact::noise::MODEL_FORM;
 use super::contact::search;
 use super::filters::rms;
 use super::judge::{ContactPart, DiscCause};
+use super::noise;
 
-/// Blocks over which residuals are averaged, s: what is left is structured where it lasts.
-const BLOCK_S: f64 = 0.05;
+/// Blocks over which residuals are averaged, s: what is left is structured where it lasts, or where it swings as mains do.
+const BLOCKS_S: [f64; 2] = [0.05, 0.005];
 /// A rest is beyond the form of a model where it is this many times [`MODEL_FORM`] of the signal: what a wrong law leaves.
 const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
@@ -56,6 +57,17 @@ fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> 
     ((sum / count - left / count).max(0.0), left / count)
 }
 
+/// Samples in the blocks, the longest first.
+fn blocks(step_s: f64) -> [usize; 2] {
+    BLOCKS_S.map(|s| (s / step_s).round().max(1.0) as usize)
+}
+
+/// The larger of what is structured over long blocks and over short ones, with what noise leaves there.
+fn larger(residual: &[f64], noise: &[f64], rows: &[usize], blocks: [usize; 2]) -> (f64, f64) {
+    let [long, short] = blocks.map(|block| structured(residual, noise, rows, block));
+    if short.0 > long.0 { short } else { long }
+}
+
 /// What the rests of the contact's balance are measured with.
 pub struct Ground {
     /// Deviations of the noise model, N m.
@@ -64,8 +76,8 @@ pub struct Ground {
     noise: Vec<f64>,
     /// Samples that are well known.
     rows: Vec<usize>,
-    /// Samples in a block.
-    block: usize,
+    /// Samples in the blocks.
+    blocks: [usize; 2],
     /// RMS of the channel, N m.
     signal: f64,
 }
@@ -80,9 +92,14 @@ impl Ground {
         let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
         Self {
             rows: (0..deviation.len()).filter(|i| deviation[*i] < limit && used[*i] != 0.0).collect(),
-            noise: contact.logs.iter().flat_map(|log| vec![log.friction_noise_nm; log.len()]).collect(),
+            // White noise alone: what swings is no noise here.
+            noise: contact
+                .logs
+                .iter()
+                .flat_map(|log| vec![noise::white_deviation(&log.friction_nm); log.len()])
+                .collect(),
             signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
-            block: (BLOCK_S / step_s).round().max(1.0) as usize,
+            blocks: blocks(step_s),
             deviation,
         }
     }
@@ -91,14 +108,9 @@ impl Ground {
         r.iter().zip(&self.deviation).map(|(r, s)| r * s).collect()
     }
 
-    #[allow(missing_docs)]
-    pub fn short(&self, r: &[f64]) -> f64 {
-        structured(&self.in_units(r), &self.noise, &self.rows, (self.block / 10).max(1)).0.sqrt()
-            / self.signal
-    }
     /// RMS of what residuals (over their deviations) have beyond noise, over that of the signal.
     pub fn size(&self, r: &[f64]) -> f64 {
-        structured(&self.in_units(r), &self.noise, &self.rows, self.block).0.sqrt() / self.signal
+        larger(&self.in_units(r), &self.noise, &self.rows, self.blocks).0.sqrt() / self.signal
     }
 }
 
@@ -116,19 +128,19 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         explained.push(search::difference(&problem, none, as_logged));
     }
     let ground = Ground::new(contact);
-    let (rows, block) = (&ground.rows, ground.block);
+    let (rows, blocks) = (&ground.rows, ground.blocks);
     let residual = ground.in_units(&fit.r);
-    let (rest, left) = structured(&residual, &ground.noise, rows, block);
+    let (rest, left) = larger(&residual, &ground.noise, rows, blocks);
     let before = as_logged
         .as_ref()
         .or(none)
-        .map_or(rest, |none| structured(&ground.in_units(none), &ground.noise, rows, block).0);
+        .map_or(rest, |none| larger(&ground.in_units(none), &ground.noise, rows, blocks).0);
     Rest {
         size: rest.sqrt() / ground.signal,
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
         times_noise: rest / left.max(1e-300),
-        follows: follows(&residual, rows, block, &contact_quantities(contact)),
+        follows: follows(&residual, rows, blocks[0], &contact_quantities(contact)),
     }
 }
 
@@ -195,15 +207,15 @@ fn follows(
 
 /// Of a linear balance; `explained` is the smallest change that a named cause makes, in the response's unit.
 pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>, explained: f64) -> Rest {
-    let block = (BLOCK_S / balance.row_step_s).round().max(1.0) as usize;
-    let (rest, left) = structured(residual, &balance.first_deviation, &balance.used, block);
-    let before = none.map_or(rest, |none| structured(none, &balance.first_deviation, &balance.used, block).0);
+    let blocks = blocks(balance.row_step_s);
+    let (rest, left) = larger(residual, &balance.first_deviation, &balance.used, blocks);
+    let before = none.map_or(rest, |none| larger(none, &balance.first_deviation, &balance.used, blocks).0);
     let time: Vec<f64> = (0..residual.len()).map(|i| i as f64).collect();
     Rest {
         size: rest.sqrt() / balance.scale.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained / balance.scale.max(1e-12),
         times_noise: rest / left.max(1e-300),
-        follows: follows(residual, &balance.used, block, &[("time".into(), time)]),
+        follows: follows(residual, &balance.used, blocks[0], &[("time".into(), time)]),
     }
 }
