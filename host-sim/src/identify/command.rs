@@ -63,6 +63,7 @@ pub fn diagnose(
             values.extend(extended_model::linear_values(linear, place));
         }
     }
+    extended_model::add_amplitudes(&mut values);
     let text = match &judgement.contact {
         Some(contact) => {
             told("extended model");

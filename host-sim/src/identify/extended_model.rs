@@ -191,6 +191,24 @@ pub fn linear_values(part: &Linear, place: usize) -> Values {
     out
 }
 
+/// Adds the amplitude of each wave, from the sizes of its cosine and its sine.
+pub fn add_amplitudes(values: &mut Values) {
+    for entry in values.values_mut() {
+        let waves: Vec<(String, Value)> = entry
+            .iter()
+            .filter_map(|(name, cosine)| {
+                let which = name.strip_prefix("cos_")?;
+                let sine = entry.get(&format!("sin_{which}"))?;
+                let size = cosine.value.hypot(sine.value).max(f64::MIN_POSITIVE);
+                let spread = |v: &Value| v.std.map(|s| s * v.value / size);
+                let std = spread(cosine).zip(spread(sine)).map(|(c, s)| c.hypot(s));
+                Some((format!("amplitude_{which}"), Value { value: size, std }))
+            })
+            .collect();
+        entry.extend(waves);
+    }
+}
+
 fn line(name: &str, value: f64) -> String {
     let value = number::text(value);
     let point = if value.contains(['.', 'e']) { "" } else { ".0" };

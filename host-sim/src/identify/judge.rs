@@ -245,8 +245,7 @@ impl Linear {
     pub fn rest(&self, place: usize) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());
         let solved = &self.solved[place];
-        let explained = self.changes(solved).into_iter().reduce(f64::min).unwrap_or(0.0);
-        rest::of_balance(&self.balance, &solved.residual, none.map(|s| s.residual.as_slice()), explained)
+        rest::of_balance(&self.balance, &solved.residual, none.map(|s| s.residual.as_slice()))
     }
 }
 

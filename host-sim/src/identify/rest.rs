@@ -23,7 +23,8 @@ pub struct Rest {
     pub size: f64,
     /// Mean square of the structured rest over the baseline's.
     pub share: f64,
-    /// Smallest change of the prediction that a named cause makes here, RMS over that of the signal; 0 where none acts.
+    /// Change of the prediction by what is named here, RMS over that of the signal; 0 where nothing acts. In the contact
+    /// that of the smallest cause.
     pub explained: f64,
     /// Mean square of the structured rest over that of the noise.
     pub times_noise: f64,
@@ -205,17 +206,18 @@ fn follows(
     out
 }
 
-/// Of a linear balance; `explained` is the smallest change that a named cause makes, in the response's unit.
-pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>, explained: f64) -> Rest {
-    let blocks = blocks(balance.row_step_s);
-    let (rest, left) = larger(residual, &balance.first_deviation, &balance.used, blocks);
-    let before = none.map_or(rest, |none| larger(none, &balance.first_deviation, &balance.used, blocks).0);
+/// Of a linear balance. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.
+pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> Rest {
+    let [block, _] = blocks(balance.row_step_s);
+    let explained = none.map_or(0.0, |none| balance.difference(none, residual));
+    let (rest, left) = structured(residual, &balance.first_deviation, &balance.used, block);
+    let before = none.map_or(rest, |none| structured(none, &balance.first_deviation, &balance.used, block).0);
     let time: Vec<f64> = (0..residual.len()).map(|i| i as f64).collect();
     Rest {
         size: rest.sqrt() / balance.scale.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained / balance.scale.max(1e-12),
         times_noise: rest / left.max(1e-300),
-        follows: follows(residual, &balance.used, blocks[0], &[("time".into(), time)]),
+        follows: follows(residual, &balance.used, block, &[("time".into(), time)]),
     }
 }
