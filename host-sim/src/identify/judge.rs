@@ -29,6 +29,8 @@ const LOG_PRIOR: f64 = -3.9;
 pub const EVIDENCE_SHARE: f64 = 0.1;
 /// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
 const LEFT_SHARE: f64 = 0.5;
+/// The law of a cause is right within this share of its size: what a second one adds may be the first one's form.
+const LAW_FORM: f64 = 0.05;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
 const SIZE_WIDTH: f64 = 0.25 / 1.7;
 /// Hypotheses below this probability say nothing of what is unknown.
@@ -481,10 +483,12 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
                 let best = within(candidates, &effects)?;
                 log_weight += EVIDENCE_SHARE * best.log_evidence;
                 places.push((*part, best.place));
-                for (effect, size) in best.effects.iter().zip(&best.sizes) {
+                for (own, (effect, size)) in best.effects.iter().zip(&best.sizes).enumerate() {
                     let at = effects.iter().position(|e| e == effect)?;
+                    let others = best.sizes.iter().enumerate().filter(|(other, _)| *other != own);
+                    let largest = others.map(|(_, size)| *size).fold(0.0, f64::max);
                     sizes[at] = sizes[at].max(*size);
-                    over_floor[at] = over_floor[at].max(*size / best.floor);
+                    over_floor[at] = over_floor[at].max(*size / best.floor.max(LAW_FORM * largest));
                 }
             }
             Some(Hypothesis { effects, log_weight, places, sizes, over_floor, probability: 0.0 })

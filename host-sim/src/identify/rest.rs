@@ -13,7 +13,9 @@ const BLOCKS_S: [f64; 2] = [0.05, 0.005];
 const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
 const MOST: f64 = 0.5;
-/// Steepness of both steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
+/// It is a trace where it is less than this share of the baseline's mean square: a fifth of its amplitude.
+const LEAST_SHARE: f64 = 0.05;
+/// Steepness of the steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
 const STEEPNESS: f64 = 8.0;
 
 /// What is left of a balance.
@@ -33,11 +35,13 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// Probability that it is something that the library does not have: larger than the form of a model is wrong, and as
-    /// large as what a cause explains.
+    /// Probability that it is something that the library does not have: larger than the form of a model is wrong, as large
+    /// as what a cause explains, and not a trace of what the baseline leaves.
     pub fn unknown(&self) -> f64 {
         let step = |ratio: f64| 1.0 / (1.0 + (-STEEPNESS * ratio.max(1e-9).ln()).exp());
-        step(self.size / (BEYOND_FORM * MODEL_FORM)) * step(self.size / (MOST * self.explained).max(1e-12))
+        step(self.size / (BEYOND_FORM * MODEL_FORM))
+            * step(self.size / (MOST * self.explained).max(1e-12))
+            * step(self.share / LEAST_SHARE)
     }
 }
 

@@ -6,6 +6,7 @@
 use super::waves::{self, Waves};
 use super::{About, DriveView, Effect, fixed_orders};
 use crate::identify::balance::Alternative;
+use crate::identify::filters::gaussian;
 
 /// The effect.
 pub(super) struct M2Ripple;
@@ -50,6 +51,18 @@ impl Effect for M2Ripple {
         };
         let found = waves::lines(&x, &r, &candidates, MOST_ORDERS, OVER_MEDIAN);
         let counts = [1, 2, 4, MOST_ORDERS].into_iter().filter(|count| *count < 2 * found.len().max(1));
-        counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], candidates.len())).collect()
+        let mut all: Vec<Alternative> =
+            counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], candidates.len())).collect();
+        // A compensated motor has the ripple in its torque and not in its motion: both are told.
+        // Through a filter that lets ripples pass.
+        let raw = |log: &super::DriveLog| gaussian(&log.position, 1.0, 1).iter().map(|d| d / log.grid.step_s).collect::<Vec<f64>>();
+        let speed: Vec<f64> = view.logs.iter().flat_map(raw).collect();
+        let (_, speed) = waves::picked(view.balance, &positions.concat(), &speed);
+        for alternative in &mut all {
+            let orders = fixed_orders(&alternative.constants);
+            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&x, &speed, *k)));
+            alternative.constants.extend(sizes);
+        }
+        all
     }
 }

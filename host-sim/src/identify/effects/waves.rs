@@ -102,6 +102,22 @@ pub fn joint(
     found
 }
 
+/// Amplitude of a wave in a signal about its mean, by least squares, over all logs, each with a phase of its own.
+pub fn amplitude(x: &[Vec<f64>], signal: &[Vec<f64>], k: f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (x, values) in x.iter().zip(signal) {
+        let columns: Vec<Vec<f64>> = [f64::cos as fn(f64) -> f64, f64::sin, |_| 1.0]
+            .into_iter()
+            .map(|wave| x.iter().map(|x| wave(k * x)).collect())
+            .collect();
+        let (h, g) = linear::normal_equations(&columns, &vec![1.0; values.len()], values);
+        let p = linear::factor(&h).solve(&g);
+        sum += (p[0] * p[0] + p[1] * p[1]) * values.len() as f64;
+        count += values.len() as f64;
+    }
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
 fn coefficients(x: &[f64], r: &[f64], k: f64) -> (f64, f64) {
     let (mut c, mut s) = (0.0, 0.0);
     for (x, r) in x.iter().zip(r) {
