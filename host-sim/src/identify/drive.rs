@@ -108,9 +108,9 @@ impl DriveLog {
         usable: Vec<bool>,
         inertia: f64,
     ) -> Self {
+        let contact = friction.is_some();
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
-        let (angle_noise, effort_noise) =
-            (noise::white_deviation(&position), noise::white_deviation(&effort));
+        let (angle_noise, effort_noise) = (deviation_of(contact, &position), deviation_of(contact, &effort));
         let root_pi = std::f64::consts::PI.sqrt();
         let inertial = |width: f64| {
             inertia * angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2)
@@ -156,6 +156,12 @@ impl DriveLog {
     pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
         gaussian(values, self.width, 0)
     }
+}
+
+/// Noise of a channel. Beside a contact it is what the channel shows in its quiet stretches; a drive alone may ripple
+/// all the time, so that only what is white counts.
+fn deviation_of(contact: bool, values: &[f64]) -> f64 {
+    if contact { noise::standard_deviation(values) } else { noise::white_deviation(values) }
 }
 
 /// Usual sizes over the training logs.
@@ -275,8 +281,8 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         };
         let effort_change = change(&log.effort);
         let friction_change = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| change(f));
-        let white = noise::white_deviation(&log.effort)
-            .hypot(log.friction.as_ref().map_or(0.0, |f| noise::white_deviation(f)));
+        let white = deviation_of(contact, &log.effort)
+            .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
         let filtered_noise = white * (0.5 / (std::f64::consts::PI.sqrt() * log.width)).sqrt();
         for i in 0..log.len() {
             let n = [
@@ -290,7 +296,7 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         }
         // What the derivative of a Gaussian lets through of white noise.
         let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
-        let speed_noise = noise::white_deviation(&log.position) * passes / log.grid.step_s;
+        let speed_noise = deviation_of(contact, &log.position) * passes / log.grid.step_s;
         let standstill = (STANDSTILL * v).max(STANDSTILL_NOISES * speed_noise);
         let stands: Vec<f64> = (0..log.len())
             .map(|i| f64::from(u8::from(log.speed[i].abs() < standstill || !log.usable[i])))

@@ -54,13 +54,16 @@ impl Effect for M2Ripple {
         let mut all: Vec<Alternative> =
             counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], candidates.len())).collect();
         // A compensated motor has the ripple in its torque and not in its motion: both are told.
-        // Through a filter that lets ripples pass.
-        let raw = |log: &super::DriveLog| gaussian(&log.position, 1.0, 1).iter().map(|d| d / log.grid.step_s).collect::<Vec<f64>>();
-        let speed: Vec<f64> = view.logs.iter().flat_map(raw).collect();
-        let (_, speed) = waves::picked(view.balance, &positions.concat(), &speed);
+        // Through a filter that lets ripples pass, at all samples: a motor that cogs stands still at times.
+        let speed: Vec<Vec<f64>> = view
+            .logs
+            .iter()
+            .map(|log| gaussian(&log.position, 1.0, 1).iter().map(|d| d / log.grid.step_s).collect())
+            .collect();
+        let whole: Vec<Vec<f64>> = positions.iter().map(|x| x.to_vec()).collect();
         for alternative in &mut all {
             let orders = fixed_orders(&alternative.constants);
-            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&x, &speed, *k)));
+            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&whole, &speed, *k)));
             alternative.constants.extend(sizes);
         }
         all
