@@ -110,12 +110,15 @@ pub fn amplitude(x: &[Vec<f64>], signal: &[Vec<f64>], k: f64) -> f64 {
             .into_iter()
             .map(|wave| x.iter().map(|x| wave(k * x)).collect())
             .collect();
-        let (h, g) = linear::normal_equations(&columns, &vec![1.0; values.len()], values);
+        // Each stretch of the way counts as much as another, however long the motion dwells there.
+        let way: Vec<f64> = (0..x.len()).map(|i| (x[(i + 1).min(x.len() - 1)] - x[i]).abs()).collect();
+        let (h, g) = linear::normal_equations(&columns, &way, values);
         let p = linear::factor(&h).solve(&g);
-        sum += (p[0] * p[0] + p[1] * p[1]) * values.len() as f64;
-        count += values.len() as f64;
+        let travelled: f64 = way.iter().sum();
+        sum += (p[0] * p[0] + p[1] * p[1]) * travelled;
+        count += travelled;
     }
-    (sum / f64::max(count, 1.0)).sqrt()
+    (sum / f64::max(count, f64::MIN_POSITIVE)).sqrt()
 }
 
 fn coefficients(x: &[f64], r: &[f64], k: f64) -> (f64, f64) {
