@@ -111,6 +111,52 @@ fn a_lagging_coefficient_follows_its_equations() {
 }
 
 #[test]
+fn a_brush_with_a_curve_follows_its_equations() {
+    let p = FrictionParameters::typical(ModelKind::BrushCurve)
+        .with("static_excess", 0.1)
+        .with("a2_s_per_m", 0.05);
+    let period = 100;
+    let step = PERIOD_S / period as f64;
+    let steps = (DURATION_S / step).round() as usize;
+    let (mut force, mut slips, mut last_v, mut out) = (0.0f64, false, 0.0f64, Vec::new());
+    for k in 0..steps {
+        let ((v, _), (_, n)) = (motion((k as f64 + 0.5) * step), motion((k as f64 + 1.0) * step));
+        slips &= v * last_v > 0.0;
+        last_v = v;
+        if !slips {
+            force += 3e4 * v * step;
+            slips = force.abs() >= 1.3 * n;
+        }
+        if slips {
+            force = (n * (g(&p, v) + 0.05 * v.abs())).copysign(v);
+        }
+        if (k + 1) % period == 0 {
+            out.push(force);
+        }
+    }
+    let seen = stepped(&p);
+    let error: f64 = out.iter().zip(&seen).map(|(a, b)| (a - b).powi(2)).sum();
+    let nrmse = (error / out.iter().map(|a| a * a).sum::<f64>()).sqrt();
+    println!("brush_curve: NRMSE {nrmse:.1e}");
+    assert!(nrmse < 1e-3, "{nrmse}");
+}
+
+#[test]
+fn a_brush_with_a_curve_drops_more_the_faster_it_slides() {
+    let model = FrictionParameters::<f64>::typical(ModelKind::BrushCurve).model(1e-5).unwrap();
+    let drop = |v: f64| {
+        let mut state = model.rest();
+        let force: Vec<f64> =
+            (0..200_000).map(|_| model.step(&mut state, &Contact::new(v, 88.0)).force_n).collect();
+        force.iter().copied().fold(0.0, f64::max) / force[199_999] - 1.0
+    };
+    for v in [0.06, 0.75] {
+        let expected = 1.2 / (0.5 + 0.7 * (-(v / 0.5f64).sqrt()).exp()) - 1.0;
+        assert!((drop(v) - expected).abs() < 0.01, "{v} m/s: {} {expected}", drop(v));
+    }
+}
+
+#[test]
 fn maxwell_slip_follows_its_equations() {
     let p = FrictionParameters::typical(ModelKind::MaxwellSlip);
     let period = 100;
@@ -205,6 +251,40 @@ fn a_load_step_at_constant_speed_is_remembered_over_a_distance_where_the_model_s
     let missing = 0.3 * 2f64.ln() / 0.95;
     assert!((1.0 - after(0.3, 1e-3) - missing * (-1f64).exp()).abs() < 0.03, "{}", after(0.3, 1e-3));
     assert!((after(0.3, 2e-2) - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_contact_that_feels_its_load_late_follows_its_equations() {
+    for length_m in [1e-4, 3e-3] {
+        let p = FrictionParameters::typical(ModelKind::PrakashClifton)
+            .with("sigma0_n_per_m", 1e5)
+            .with("sigma1_n_s_per_m", 10.0)
+            .with("a2_s_per_m", 0.05)
+            .with("memory_length_m", length_m);
+        let equations = move |y: &[f64], v: f64, n: f64| {
+            let felt = (v.abs() + 1e-6) / length_m * (n - y[1]);
+            let rate = v - 1e5 * v.abs() * y[0] / (y[1] * g(&p, v));
+            (vec![rate, felt], 1e5 * y[0] + 10.0 * rate + y[1] * 0.05 * v)
+        };
+        assert_follows(&p, &equations, &[0.0, 60.0], 100);
+    }
+}
+
+#[test]
+fn a_load_step_on_a_contact_that_feels_its_load_late_has_no_jump_and_acts_as_e_to_the_way_slid() {
+    let p = FrictionParameters::<f64>::typical(ModelKind::PrakashClifton);
+    let model = p.model(1e-5).unwrap();
+    let mut state = model.rest();
+    let mut force = |load_n: f64, steps: u32| {
+        (0..steps).map(|_| model.step(&mut state, &Contact::new(0.1, load_n)).force_n).last().unwrap()
+    };
+    let before = force(50.0, 100_000);
+    let at_once = force(100.0, 1);
+    assert!((at_once / before - 1.0).abs() < 3e-3, "{before} {at_once}");
+    // After 1 mm = L in all; the first step's load counts as risen over that step.
+    let after = force(100.0, 999);
+    let expected = before * (2.0 - (-1.0f64).exp());
+    assert!((after / expected - 1.0).abs() < 2e-3, "{after} {expected}");
 }
 
 /// Block with Maxwell branches and bristles: state u, z, and the branches' forces.

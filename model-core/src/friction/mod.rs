@@ -3,6 +3,7 @@
 //! | model | equations | overshoots at constant sliding speed and normal force? |
 //! |---|---|---|
 //! | [`brush`] | 4–6 | a drop by µ_s/µ_c − 1, as a discontinuity |
+//! | [`brush_curve`] | 4–6 | the same, with µ_c falling with speed as eqs. 4 and 10 have it |
 //! | [`brush_patch`] | 7–11 | each element as above; the sum over the patch hardly |
 //! | [`lugre`] | 12–14 | no: the bristle deflection rises monotonically |
 //! | [`lugre_patch`] | 15–16 | no |
@@ -14,12 +15,14 @@
 //! | [`elasto_plastic`] | | no: as LuGre, without its drift |
 //! | [`maxwell_slip`] | | no: elements slide where they break loose |
 //! | [`frictional_lag`] | | yes, where the lag is longer than the wind-up |
+//! | [`prakash_clifton`] | | no: as LuGre; a step of the load acts after a distance |
 //! | [`rate_state`] | | yes: by the direct effect and by the strength of a rested contact |
 //!
 //! Equation and figure numbers are those of Božić, Petrović, Matuško (2009). Every model is a value
 //! prepared once from validated parameters, and a pure `step(&self, &mut state, &contact)`.
 
 pub mod brush;
+pub mod brush_curve;
 pub mod brush_patch;
 mod contact;
 pub mod dahl;
@@ -31,6 +34,8 @@ pub mod lugre_patch;
 pub mod maxwell_slip;
 pub mod modified_lugre;
 mod parameters;
+pub mod prakash_clifton;
+pub mod pressure;
 pub mod rate_state;
 #[macro_use]
 mod registry;
@@ -54,6 +59,8 @@ use stribeck::Stribeck;
 models! {
     /// Brush with reset.
     Brush, brush::Brush<T>, brush::BrushState<T>, "brush";
+    /// Brush with reset whose sliding coefficient follows a curve.
+    BrushCurve, brush_curve::BrushCurve<T>, brush::BrushState<T>, "brush_curve";
     /// LuGre.
     Lugre, lugre::Lugre<T>, lugre::LugreState<T>, "lugre";
     /// Modified LuGre as printed.
@@ -74,6 +81,8 @@ models! {
     Dieterich, rate_state::Dieterich<T>, rate_state::RateStateState<T>, "dieterich";
     /// Rate-and-state friction with the slip law, under an elastic block.
     Ruina, rate_state::Ruina<T>, rate_state::RateStateState<T>, "ruina";
+    /// LuGre that feels a change of its load over a distance of sliding.
+    PrakashClifton, prakash_clifton::PrakashClifton<T>, prakash_clifton::PrakashCliftonState<T>, "prakash_clifton";
     /// Zener rubber in series with LuGre bristles.
     SeriesZener, series_zener::SeriesZener<T>, series::SeriesState<T, 1>, "series_zener";
     /// Filled rubber, a spectrum of Maxwell branches shifted by temperature, in series with LuGre bristles.
