@@ -17,17 +17,20 @@ fn rig(arguments: &[&str], folder: &Path) -> Output {
 #[ignore = "driven with the measured speed, bristles leave 0.33 % on figs. 18-21: the diagnosis does not name the block there yet"]
 fn the_case_study_names_the_block_that_lugre_lacks() {
     let made = demo(|_, _, _| ()).unwrap();
-    assert_eq!(made.story.diagnosis.verdict, "named", "{}", made.story.diagnosis.sentence);
-    let causes: Vec<&str> = made.story.diagnosis.causes.iter().map(|cause| cause.id.as_str()).collect();
+    assert_eq!(made.case_study.diagnosis.verdict, "named", "{}", made.case_study.diagnosis.sentence);
+    let causes: Vec<&str> = made.case_study.diagnosis.causes.iter().map(|cause| cause.id.as_str()).collect();
     assert_eq!(causes, ["element_compliance"]);
-    assert!(made.story.diagnosis.extended.gain.unwrap() > 0.4, "{}", made.story.found());
+    assert!(made.case_study.diagnosis.extended.gain.unwrap() > 0.4, "{}", made.case_study.found());
 }
 
 #[test]
 fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_byte() {
-    let mut told = Vec::new();
-    let made = demo(|done, total, what| told.push((done, total, what.to_string()))).unwrap();
-    assert!(told.windows(2).all(|w| w[1].0 > w[0].0) && told.last().unwrap().0 == told[0].1, "{told:?}");
+    let mut progress = Vec::new();
+    let made = demo(|done, total, what| progress.push((done, total, what.to_string()))).unwrap();
+    assert!(
+        progress.windows(2).all(|w| w[1].0 > w[0].0) && progress.last().unwrap().0 == progress[0].1,
+        "{progress:?}"
+    );
 
     let figure = figure::overshoot_svg(&made.runs).unwrap();
     let committed = include_str!("../figures/overshoot.svg");
@@ -38,14 +41,14 @@ fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_
 
     for c in &made.runs.comparisons {
         for candidate in &c.candidates {
-            let (name, o) = (candidate.contender.name, candidate);
-            match candidate.contender.role {
+            let (name, o) = (candidate.model.name, candidate);
+            match candidate.model.role {
                 Role::Series => assert!(o.constant_overshoot > 0.1 && o.closed_overshoot > 0.1, "{name}"),
                 Role::Brush => assert!(o.constant_overshoot > 0.1, "{name}"),
                 _ => assert!(o.constant_overshoot.abs() < 1e-4, "{name}: {}", o.constant_overshoot),
             }
             // Driven by the rig's own motion the series element must give the rig's own friction.
-            if candidate.contender.role == Role::Series {
+            if candidate.model.role == Role::Series {
                 let error: f64 = o.open_nm.iter().zip(&o.closed_nm).map(|(a, b)| (a - b) * (a - b)).sum();
                 let power: f64 = o.closed_nm.iter().map(|b| b * b).sum();
                 let nrmse = (error / power).sqrt();

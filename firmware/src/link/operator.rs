@@ -3,7 +3,7 @@
 //! One request at a time, so what is prepared here and lent to the tick has one owner at any moment.
 
 use crate::handover::Handover;
-use crate::settings::{Refused as NotKept, Settings};
+use crate::settings::{Refused as NotStored, Settings};
 use crate::tick::{Carried, Order};
 use crate::{capture, restart, tick};
 use embassy_time::{Duration, Instant, Timer};
@@ -12,8 +12,9 @@ use heapless::{String, Vec};
 use model_core::control::{Command as Core, ControlConfig, Mode, ObserverModel, PreparedExperiment, Refusal};
 use model_core::error::ParameterError;
 use model_core::selfcheck;
+use rig_link::inputs::Inputs;
 use rig_link::message::{
-    Answer, CAPTURE_CHUNK, Command, Hello, KeptMessage, PROTOCOL_VERSION, Rejection, ResetCause,
+    Answer, CAPTURE_CHUNK, Command, CrashRecord, Hello, PROTOCOL_VERSION, Rejection, ResetCause,
 };
 use rig_link::model::ModelRecord;
 use rig_link::program::{ProgramHeader, Upload};
@@ -32,8 +33,8 @@ pub struct Identity {
     pub reset: ResetCause,
     /// The clock comes from the crystal.
     pub crystal: bool,
-    /// What was kept from before.
-    pub kept: Option<KeptMessage>,
+    /// The crash record from before.
+    pub crash_record: Option<CrashRecord>,
 }
 
 /// The one who carries out requests.
@@ -44,6 +45,7 @@ pub struct Operator {
     upload: Upload,
     orders: Producer<'static, Order>,
     answers: Consumer<'static, Carried>,
+    inputs: Consumer<'static, Inputs>,
 }
 
 /// Why an order to the tick was not carried out.
@@ -73,8 +75,9 @@ impl Operator {
         config: ControlConfig,
         orders: Producer<'static, Order>,
         answers: Consumer<'static, Carried>,
+        inputs: Consumer<'static, Inputs>,
     ) -> Self {
-        Self { identity, settings, config, upload: Upload::default(), orders, answers }
+        Self { identity, settings, config, upload: Upload::default(), orders, answers, inputs }
     }
 
     /// Carries out one request.
@@ -109,10 +112,11 @@ impl Operator {
             Command::CaptureTrigger => self.order(Order::CaptureTrigger).await,
             Command::CaptureStatus => Answer::Capture(capture::info()),
             Command::CaptureRead { offset } => read_capture(offset),
-            Command::KeptMessage => Answer::Kept(self.identity.kept.clone()),
+            Command::CrashRecord => Answer::CrashRecord(self.identity.crash_record.clone()),
             Command::SelfCheck { case, steps } => self_check(case, steps),
             Command::Restart if !drives_off() => Answer::Rejected(Rejection::NotDisabled),
             Command::Restart => restart::by_command(),
+            Command::Inputs => self.raw_inputs().await,
         }
     }
 
@@ -126,7 +130,7 @@ impl Operator {
             counts_per_rev: self.settings.counts_per_rev(),
             reset: self.identity.reset,
             crystal: self.identity.crystal,
-            kept: self.identity.kept.is_some(),
+            crash_record: self.identity.crash_record.is_some(),
         }
     }
 
@@ -150,6 +154,14 @@ impl Operator {
     async fn order(&mut self, order: Order) -> Answer {
         match self.ask(order).await {
             Ok(()) => Answer::Done,
+            Err(undone) => undone.into(),
+        }
+    }
+
+    async fn raw_inputs(&mut self) -> Answer {
+        while self.inputs.dequeue().is_some() {}
+        match self.ask(Order::Inputs).await {
+            Ok(()) => self.inputs.dequeue().map_or(Answer::Rejected(Rejection::NoTick), Answer::Inputs),
             Err(undone) => undone.into(),
         }
     }
@@ -213,7 +225,7 @@ impl Operator {
             Err(error) => return out_of_range(&error),
         };
         if let Err(refused) = self.settings.keep_model(model).await {
-            return not_kept(&refused);
+            return not_stored(&refused);
         }
         self.config.set_model(&prepared);
         // The model alone: a swap of the whole configuration would forget the tare.
@@ -224,13 +236,13 @@ impl Operator {
     }
 
     /// What could not be stored is not used either.
-    async fn restore(&mut self, refused: NotKept) -> Answer {
+    async fn restore(&mut self, refused: NotStored) -> Answer {
         if let Ok(config) = self.settings.config()
             && let Err(answer) = self.change(&config).await
         {
             return answer;
         }
-        not_kept(&refused)
+        not_stored(&refused)
     }
 
     fn model(&self) -> Answer {
@@ -278,10 +290,10 @@ fn read_capture(offset: u32) -> Answer {
     }
 }
 
-fn not_kept(refused: &NotKept) -> Answer {
+fn not_stored(refused: &NotStored) -> Answer {
     match refused {
-        NotKept::OutOfRange(error) => out_of_range(error),
-        NotKept::Storage => Answer::Rejected(Rejection::Storage),
+        NotStored::OutOfRange(error) => out_of_range(error),
+        NotStored::Storage => Answer::Rejected(Rejection::Storage),
     }
 }
 

@@ -3,6 +3,7 @@
 //! A subcommand is a `clap::Args` struct with `fn run(self) -> Result<(), InputError>` in its own file
 //! and one line in `Command` here.
 
+mod commission;
 pub mod common;
 mod convert;
 mod demo;
@@ -14,6 +15,7 @@ mod keeper;
 mod monitor;
 mod port;
 mod predict;
+mod prediction_page;
 mod record;
 mod rivals;
 mod run;
@@ -93,6 +95,7 @@ commands! {
     Run(run::Run),
     Monitor(monitor::Monitor),
     Settings(settings::Settings),
+    Commission(commission::Commission),
     Convert(convert::Convert),
     Completions(convert::Completions),
 }

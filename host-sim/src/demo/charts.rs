@@ -99,7 +99,7 @@ fn time_chart(run: &ClosedLoop, windows: Vec<Window>, torque_mode: bool) -> Char
         Panel {
             y_title: "speed of the disc, rpm".into(),
             lines: vec![
-                line("asked for", Role::Reference, run, (0.01, 0.01), |f| {
+                line("setpoint", Role::Reference, run, (0.01, 0.01), |f| {
                     RPM * f64::from(f.record.m2_speed_ref_rad_s)
                 }),
                 line("measured", Role::Measured, run, (0.1, 0.005), |f| {
@@ -223,8 +223,8 @@ pub(super) fn comparison(c: &Comparison) -> Chart {
         c.candidates
             .iter()
             .map(|k| Line {
-                name: k.contender.name.into(),
-                role: k.contender.role,
+                name: k.model.name.into(),
+                role: k.model.role,
                 x: c.time_s.clone(),
                 y: pick(k),
                 tolerance: 0.01,

@@ -1,6 +1,6 @@
 //! Records what the rig does without commanding it: telemetry for a time, or until it is enough.
 
-use rig_link::message::{Answer, Command, EventMessage, Hello, KeptMessage, Message};
+use rig_link::message::{Answer, Command, CrashRecord, EventMessage, Hello, Message};
 use rig_link::telemetry::{Health, TelemetryRow};
 
 use super::ask::{Ask, check_hello};
@@ -10,6 +10,8 @@ use super::rows::Scale;
 use super::words;
 use crate::input_error::{InputError, Kind};
 
+/// Control ticks a second, where nobody can be asked: it belongs to the board.
+const TICK_HZ: u32 = 10_000;
 const M1_COUNTS_KEY: u16 = 160;
 const M2_COUNTS_KEY: u16 = 170;
 
@@ -20,8 +22,8 @@ pub struct Recorded {
     pub hello: Hello,
     /// How its counts and ticks are to be read.
     pub scale: Scale,
-    /// What the firmware kept from before its last restart.
-    pub kept: Option<KeptMessage>,
+    /// The crash record from before its last restart.
+    pub crash_record: Option<CrashRecord>,
     /// The rows.
     pub rows: Vec<TelemetryRow>,
     /// What happened meanwhile.
@@ -36,6 +38,8 @@ pub struct Record {
     every_ticks: u16,
     ticks: u64,
     keep_rows: bool,
+    /// Only listens: another command holds the port.
+    listens: bool,
     ask: Ask,
     recorded: Option<Recorded>,
     /// Telemetry was switched off again.
@@ -54,19 +58,41 @@ impl Record {
             Command::Hello,
             Command::SettingGet { key: M1_COUNTS_KEY },
             Command::SettingGet { key: M2_COUNTS_KEY },
-            Command::KeptMessage,
+            Command::CrashRecord,
             Command::Telemetry { every_ticks },
         ];
         Self {
             every_ticks,
             ticks: (duration_s * 1e4) as u64,
             keep_rows,
+            listens: false,
             ask: Ask::new(commands),
             recorded: None,
             ending: false,
             done: false,
             heard_s: 0.0,
             notes: Vec::new(),
+        }
+    }
+
+    /// Records what another command has ordered, without a word to the rig, until it is ended.
+    #[must_use]
+    pub fn listening() -> Self {
+        let scale = Scale { tick_hz: TICK_HZ, m1_counts_per_rev: 0, m2_counts_per_rev: 0 };
+        let recorded = Recorded {
+            hello: Hello::default(),
+            scale,
+            crash_record: None,
+            rows: Vec::new(),
+            events: Vec::new(),
+            health: None,
+        };
+        Self {
+            ticks: u64::MAX,
+            listens: true,
+            ask: Ask::new([]),
+            recorded: Some(recorded),
+            ..Self::new(1, 0.0, true)
         }
     }
 
@@ -83,6 +109,10 @@ impl Record {
 
     /// Ends the recording now.
     pub fn finish_early(&mut self) {
+        if self.listens {
+            self.done = true;
+            return;
+        }
         if self.recorded.is_none() {
             self.ask.forget_waiting();
         }
@@ -92,7 +122,7 @@ impl Record {
     }
 
     fn begin(&mut self, answers: &[Answer]) -> Result<(), InputError> {
-        let [hello, m1_counts, m2_counts, kept, telemetry] = answers else {
+        let [hello, m1_counts, m2_counts, record, telemetry] = answers else {
             return Err(InputError::new("the rig did not answer the greeting"));
         };
         let hello = check_hello(hello)?;
@@ -101,20 +131,20 @@ impl Record {
             Answer::Setting(state) => Ok(state.active as u32),
             other => Err(words::unexpected(other)),
         };
-        let kept = match kept {
-            Answer::Kept(kept) => kept.clone(),
+        let crash_record = match record {
+            Answer::CrashRecord(record) => record.clone(),
             other => return Err(words::unexpected(other)),
         };
         words::accepted(telemetry)?;
         self.notes.push(words::hello(&hello));
-        self.notes.extend(kept.iter().map(|kept| words::kept(kept, hello.tick_hz)));
+        self.notes.extend(crash_record.iter().map(|record| words::crash_record(record, hello.tick_hz)));
         let scale = Scale {
             tick_hz: hello.tick_hz,
             m1_counts_per_rev: counts(m1_counts)?,
             m2_counts_per_rev: counts(m2_counts)?,
         };
         let (rows, events, health) = (Vec::new(), Vec::new(), None);
-        self.recorded = Some(Recorded { hello, scale, kept, rows, events, health });
+        self.recorded = Some(Recorded { hello, scale, crash_record, rows, events, health });
         Ok(())
     }
 
@@ -165,7 +195,8 @@ impl Procedure for Record {
         for message in self.ask.take_others() {
             self.take(message, now_s);
         }
-        if self.recorded.is_some() && !self.ending && now_s - self.heard_s > 2.0 {
+        // Whoever holds the port may have no telemetry on.
+        if self.recorded.is_some() && !self.ending && !self.listens && now_s - self.heard_s > 2.0 {
             return Err(InputError::new("the rig has gone silent").of_kind(Kind::Rig));
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The rig behind the control core, in `f64`: drives, press, disc, rubber elements, sensors.
+//! The rig behind the control core, in `f64`: drives, normal-load actuator, disc, rubber elements, sensors.
 //!
 //! One [`Plant::step`] covers one control period. The linear parts (drive lags, normal force, torque ring and
 //! amplifiers) are discretised exactly once. Disc and elements are coupled by a velocity Verlet step: half a
@@ -21,16 +21,18 @@ mod effects;
 mod elements;
 mod encoder;
 mod from_files;
+mod hands;
 mod linear;
 mod noise;
+mod normal_load;
 pub mod parameters;
-mod press;
 mod step;
 
 pub use analogue::PinVoltages;
 pub use effects::left_out;
 pub use elements::{ElementModel, ElementParameters, ElementState};
 pub use encoder::Edge;
+pub use hands::Hands;
 pub use parameters::PlantParameters;
 
 use analogue::{Analogue, Quantities};
@@ -114,6 +116,7 @@ pub struct Plant {
     activity: Activity,
     sweeps: Option<Vec<[Sweep; 2]>>,
     noise: Noise,
+    hands: Hands,
 }
 
 impl Plant {
@@ -137,6 +140,7 @@ impl Plant {
             activity: Activity::default(),
             sweeps: None,
             noise: Noise::new(seed),
+            hands: Hands::default(),
         })
     }
 
@@ -145,6 +149,16 @@ impl Plant {
     pub fn with_edges(mut self) -> Self {
         self.sweeps = Some(Vec::with_capacity(self.busy.substeps as usize));
         self
+    }
+
+    /// What a person does by hand.
+    pub fn hands(&mut self) -> &mut Hands {
+        &mut self.hands
+    }
+
+    /// A hand turns the disc by an angle from now on, and lets go.
+    pub fn turn_by_hand(&mut self, by_rad: f64) {
+        self.hands.turn(self.state.disc.angle_rad, by_rad);
     }
 
     /// Advances the plant by one control period and samples it at its end.
@@ -160,6 +174,7 @@ impl Plant {
     /// Advances the plant by one control period with torque commands in N·m, without sampling it.
     pub fn advance(&mut self, m1_command_nm: f64, m2_command_nm: f64) {
         let commands = [m1_command_nm, m2_command_nm];
+        let disc_nm = self.hands.disc_nm(self.state.disc.angle_rad, self.state.disc.speed_rad_s);
         // By reference: a grid holds two prepared models, and copying it each period costs more than a calm step.
         let busy = self.activity.is_busy(&self.state, commands);
         let substeps = if busy { self.busy.substeps } else { self.calm.substeps };
@@ -169,7 +184,7 @@ impl Plant {
         for k in 0..substeps {
             let from = self.sweeps.is_some().then(|| self.positions());
             let grid = if busy { &self.busy } else { &self.calm };
-            grid.advance(&self.disc, self.radius_m, &mut self.state, commands);
+            grid.advance(&self.disc, self.radius_m, &mut self.state, commands, (&self.hands, disc_nm));
             if let Some(from) = from {
                 let to = self.positions();
                 let start_s = f64::from(k) * grid.step_s;
@@ -192,7 +207,7 @@ impl Plant {
             &Quantities {
                 friction_nm: self.calm.bridges[0].output(&s.bridges[0]),
                 normal_n: self.calm.bridges[1].output(&s.bridges[1]),
-                m1_torque_nm: s.press.torque_nm(),
+                m1_torque_nm: s.normal_load.torque_nm(),
                 m2_torque_nm: s.m2_torque_nm,
             },
             &mut self.noise,
@@ -206,15 +221,15 @@ impl Plant {
     pub fn truth(&self) -> Truth {
         let s = &self.state;
         Truth {
-            m1_torque_nm: s.press.torque_nm(),
-            m1_angle_rad: self.calm.press.angle_rad(&s.press),
+            m1_torque_nm: s.normal_load.torque_nm(),
+            m1_angle_rad: self.calm.normal_load.angle_rad(&s.normal_load),
             m2_torque_nm: s.m2_torque_nm,
             m2_angle_rad: s.disc.motor_angle_rad,
             m2_speed_rad_s: s.disc.motor_speed_rad_s,
             disc_angle_rad: s.disc.angle_rad,
             disc_speed_rad_s: s.disc.speed_rad_s,
             sliding_speed_m_s: s.sliding_speed_m_s,
-            normal_force_n: s.press.normal_force_n(),
+            normal_force_n: s.normal_load.normal_force_n(),
             friction_torque_nm: s.friction_torque_nm,
             bearing_torque_nm: self.disc.bearing().torque_and_slope(s.disc.speed_rad_s).0,
             deformation_m: s.elements.deformation_m(),
@@ -233,7 +248,10 @@ impl Plant {
     fn positions(&self) -> [(f64, f64); 2] {
         let s = &self.state;
         [
-            (self.calm.press.angle_rad(&s.press), self.calm.press.speed_rad_s(&s.press)),
+            (
+                self.calm.normal_load.angle_rad(&s.normal_load),
+                self.calm.normal_load.speed_rad_s(&s.normal_load),
+            ),
             (s.disc.motor_angle_rad, s.disc.motor_speed_rad_s),
         ]
     }

@@ -6,8 +6,8 @@
 //! over the period. So what a tick computes from the samples of one period acts from the start of the next: one
 //! control period of delay, as in the PC rig.
 
-use crate::desk::{BenchEnd, Question, ToBench, ToDesk};
 use crate::elf::Firmware;
+use crate::endpoint::{BenchEnd, Question, ToBench, ToEndpoint};
 use crate::meter::{Meter, Moment};
 use crate::outside::{Action, DriveInputs, Outside, PlantSide, Sensors};
 use crate::part::Part;
@@ -135,14 +135,15 @@ impl BenchDriver {
 
     /// Switches and drives to their pins, voltages to their inputs.
     fn show_outside(&self, part: &mut Part, at: VirtualNanos) {
-        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, .. } = &self.outside;
-        pins::drive(part, at, pins::ARM_SWITCH, *arm_switch);
-        pins::drive(part, at, pins::STOP_RELEASED, !stop_pressed);
+        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, wiring, .. } = &self.outside;
+        pins::drive(part, at, pins::ARM_SWITCH, *arm_switch != wiring.arm_switch_inverted);
+        pins::drive(part, at, pins::STOP_RELEASED, wiring.stop_bridged || !stop_pressed);
         for (place, healthy) in pins::DRIVE_HEALTHY.into_iter().zip(healthy) {
             pins::drive(part, at, place, *healthy);
         }
+        let arriving = wiring.arriving(&self.sensors, REFERENCE_MICROVOLT / 2);
         for (index, channel) in pins::ADC_CHANNELS.into_iter().enumerate() {
-            let microvolt = held_microvolt[index].unwrap_or(self.sensors.microvolt[index]);
+            let microvolt = held_microvolt[index].unwrap_or(arriving[index]);
             part.adc1.set_input(channel, microvolt);
         }
     }
@@ -170,8 +171,13 @@ impl BenchDriver {
         for (code, wire) in inputs.dac.iter_mut().zip(self.outside.references) {
             *code = wire.pass(*code);
         }
+        let wiring = self.outside.wiring;
+        inputs.dac = wiring.followed(inputs.dac);
         let encoders = &mut part.encoders;
-        self.sensors = self.plant.step(at, &inputs, &mut |motor, edge| encoders[motor as usize].push(edge));
+        self.sensors = self.plant.step(at, &inputs, &mut |motor, edge| {
+            let plug = motor as usize;
+            encoders[if wiring.encoders_exchanged { 1 - plug } else { plug }].push(edge);
+        });
     }
 
     fn act(&mut self, action: Action, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
@@ -186,6 +192,19 @@ impl BenchDriver {
                 }
             }
             Action::EncoderLine(motor, line, level) => part.encoders[motor as usize].stick(line, level),
+            Action::EncodersExchanged(exchanged) => self.outside.wiring.encoders_exchanged = exchanged,
+            Action::BridgesExchanged(exchanged) => self.outside.wiring.bridges_exchanged = exchanged,
+            Action::BridgeReversed(bridge, reversed) => {
+                if let Some(wires) = self.outside.wiring.bridge_reversed.get_mut(bridge) {
+                    *wires = reversed;
+                }
+            }
+            Action::MotorReversed(motor, reversed) => {
+                self.outside.wiring.motor_reversed[motor as usize] = reversed;
+            }
+            Action::ArmSwitchInverted(inverted) => self.outside.wiring.arm_switch_inverted = inverted,
+            Action::StopBridged(bridged) => self.outside.wiring.stop_bridged = bridged,
+            Action::Hand(hand) => self.plant.touch(hand),
             Action::EncoderSwapped(motor, swapped) => part.encoders[motor as usize].swap(swapped),
             Action::EncoderDisturbed(motor, width_ns) => {
                 part.encoders[motor as usize].disturb(Disturbance { at: stop.at, width_ns });
@@ -277,12 +296,12 @@ impl BenchDriver {
         }
         if self.wakes_at.take().is_some() {
             let bytes = std::mem::take(&mut self.received);
-            if self.end.to_desk.send(ToDesk::Woken { now: stop.at.0, bytes }).is_err() {
+            if self.end.to_endpoint.send(ToEndpoint::Woken { now: stop.at.0, bytes }).is_err() {
                 return false;
             }
         }
         loop {
-            let Ok(message) = self.end.from_desk.recv() else { return false };
+            let Ok(message) = self.end.from_endpoint.recv() else { return false };
             match message {
                 ToBench::Wait(until) => {
                     self.wakes_at = Some(until);
@@ -292,7 +311,7 @@ impl BenchDriver {
                 ToBench::Act(action) => self.act(action, session, stop, host),
                 ToBench::Ask(question) => {
                     let answer = self.answer(question, session, stop, host);
-                    if self.end.to_desk.send(answer).is_err() {
+                    if self.end.to_endpoint.send(answer).is_err() {
                         return false;
                     }
                 }
@@ -306,17 +325,17 @@ impl BenchDriver {
         session: &mut Session<RigBoard>,
         stop: Stop,
         host: &mut dyn Host,
-    ) -> ToDesk {
+    ) -> ToEndpoint {
         let part = &mut session.board_mut().part;
         match question {
             Question::BeginMeasuring => {
                 self.meter.begin();
-                ToDesk::Done(Ok(()))
+                ToEndpoint::Done(Ok(()))
             }
-            Question::EndMeasuring => ToDesk::Measured(Box::new(self.meter.end())),
-            Question::Outputs => ToDesk::Outputs(Self::outputs(part, stop.at)),
-            Question::WrongPins => ToDesk::WrongPins(pins::wrong_modes(part, stop.at)),
-            Question::Memory { address, length } => ToDesk::Memory(
+            Question::EndMeasuring => ToEndpoint::Measured(Box::new(self.meter.end())),
+            Question::Outputs => ToEndpoint::Outputs(Self::outputs(part, stop.at)),
+            Question::WrongPins => ToEndpoint::WrongPins(pins::wrong_modes(part, stop.at)),
+            Question::Memory { address, length } => ToEndpoint::Memory(
                 (address..address + length)
                     .step_by(8)
                     .map_while(|at| host.read(at, Width::W64).ok())
@@ -325,12 +344,12 @@ impl BenchDriver {
             ),
             Question::TakeLog => {
                 self.record.outputs.clear();
-                ToDesk::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
+                ToEndpoint::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
             }
-            Question::Register(address) => ToDesk::Register(interference::read(part, stop.at, address)),
+            Question::Register(address) => ToEndpoint::Register(interference::read(part, stop.at, address)),
             Question::Snapshot => {
                 let taken = snapshot::take(session, host, stop, &self.addresses.digest, &NothingMore);
-                ToDesk::Done(taken.map_err(|error| error.to_string()).map(|taken| {
+                ToEndpoint::Done(taken.map_err(|error| error.to_string()).map(|taken| {
                     self.record.saved = Some(Saved {
                         file: taken.file,
                         plant: self.plant.duplicate(),

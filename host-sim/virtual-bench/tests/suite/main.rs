@@ -3,10 +3,12 @@
 
 mod bits;
 mod chain;
+mod commission;
 mod cost;
 mod defmt;
 mod faults;
 mod figures;
+mod interrupted;
 mod runs;
 mod serve;
 mod silicon;

@@ -12,19 +12,20 @@
 use super::linear::Held;
 use super::parameters::PlantParameters;
 
-/// The press, prepared for a step size.
+/// The normal-load actuator, prepared for a step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Press {
+pub(crate) struct NormalLoad {
     system: Held<3, 2>,
     preload_n: f64,
+    gain_n_per_nm: f64,
     radian_per_newton: f64,
 }
 
 /// Torque of M1, force x and its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressState([f64; 3]);
+pub(crate) struct NormalLoadState([f64; 3]);
 
-impl Press {
+impl NormalLoad {
     pub(crate) fn new(p: &PlantParameters, step_s: f64) -> Self {
         let rate = 1.0 / p.m1.lag_s();
         let w = std::f64::consts::TAU * p.pressure.mode_hz;
@@ -38,30 +39,33 @@ impl Press {
         Self {
             system: Held::new(&a, &b, step_s),
             preload_n: p.pressure.preload_n,
+            gain_n_per_nm: p.geometry.lever_gain_n_per_nm,
             radian_per_newton: 1.0 / p.geometry.mechanism_stiffness_n_per_rad,
         }
     }
 
     /// At rest without torque: the springs hold the elements off.
-    pub(crate) fn rest(&self) -> PressState {
-        PressState([0.0, -self.preload_n, 0.0])
+    pub(crate) fn rest(&self) -> NormalLoadState {
+        NormalLoadState([0.0, -self.preload_n, 0.0])
     }
 
     #[inline]
-    pub(crate) fn step(&self, state: &mut PressState, command_nm: f64) {
-        state.0 = self.system.step(&state.0, &[command_nm, self.preload_n]);
+    pub(crate) fn step(&self, state: &mut NormalLoadState, command_nm: f64, hand_nm: f64) {
+        // A hand on the shaft works on the mechanism at once, without the drive's lag.
+        let held_up_n = self.preload_n - self.gain_n_per_nm * hand_nm;
+        state.0 = self.system.step(&state.0, &[command_nm, held_up_n]);
     }
 
-    pub(crate) fn angle_rad(&self, state: &PressState) -> f64 {
+    pub(crate) fn angle_rad(&self, state: &NormalLoadState) -> f64 {
         (state.0[1] + self.preload_n) * self.radian_per_newton
     }
 
-    pub(crate) fn speed_rad_s(&self, state: &PressState) -> f64 {
+    pub(crate) fn speed_rad_s(&self, state: &NormalLoadState) -> f64 {
         state.0[2] * self.radian_per_newton
     }
 }
 
-impl PressState {
+impl NormalLoadState {
     pub(crate) fn torque_nm(&self) -> f64 {
         self.0[0]
     }
