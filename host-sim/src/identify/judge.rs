@@ -274,6 +274,9 @@ pub struct Hypothesis {
     pub probability: f64,
 }
 
+/// What is left, by balance.
+type Rests = Vec<(Part, Rest)>;
+
 /// What was found.
 pub struct Judgement {
     /// The contact, where the logs have one.
@@ -289,7 +292,7 @@ pub struct Judgement {
     /// Probability that the rest is something that the library does not have.
     pub unknown: f64,
     /// What is left, by balance.
-    pub rests: Vec<(Part, Rest)>,
+    pub rests: Rests,
     /// What was assumed about the input.
     pub notes: Vec<String>,
     /// Whether the logs are of a linear stage.
@@ -557,7 +560,7 @@ impl Judgement {
 
     /// The probability that what a hypothesis leaves is something unknown is that of all hypotheses, each with its own.
     fn weigh_rests(&mut self) {
-        let mut weighed: Vec<(f64, Hypothesis, Vec<(Part, Rest)>)> = Vec::new();
+        let mut weighed: Vec<(f64, Hypothesis, Rests)> = Vec::new();
         for h in std::mem::take(&mut self.hypotheses) {
             let rests = if h.probability > LEAST_PROBABILITY { self.rests_of(&h) } else { Vec::new() };
             let unknown = rests.iter().map(|(_, rest)| rest.unknown()).fold(0.0, f64::max);
@@ -576,7 +579,7 @@ impl Judgement {
         self.hypotheses = weighed.into_iter().map(|(_, h, _)| h).collect();
     }
 
-    fn rests_of(&self, hypothesis: &Hypothesis) -> Vec<(Part, Rest)> {
+    fn rests_of(&self, hypothesis: &Hypothesis) -> Rests {
         let place = |part: Part| hypothesis.places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place);
         let mut out = Vec::new();
         if let (Some(contact), Some(place)) = (&self.contact, place(Part::Friction)) {
