@@ -39,7 +39,7 @@ async fn main(spawner: Spawner) {
         Err(error) => panic!("the link's rate is not possible: {error:?}"),
     };
     let identity = Identity { reset, crystal, kept };
-    let operator = Operator::new(identity, settings, config, ends.orders, ends.answers);
+    let operator = Operator::new(identity, settings, config, ends.orders, ends.answers, ends.inputs);
     start_task(spawner, log::log(ends.events));
     start_task(spawner, link::send(tx, &mut buffers.sending, ends.rows, ends.health));
     start_task(spawner, link::receive(rx, operator));

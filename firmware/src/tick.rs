@@ -27,10 +27,11 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::pac::Interrupt;
 use heapless::spsc::{Consumer, Producer, Queue};
 use model_core::control::{
-    Command, ControlConfig, ControlState, Event, Fault, Leds, Outputs, Refused, Samples, SequencerState,
-    apply, step,
+    Command, ControlConfig, ControlState, DAC_ZERO, Event, Fault, Leds, Outputs, Refused, Samples,
+    SequencerState, apply, step,
 };
 use rig_link::capture::CaptureTrigger;
+use rig_link::inputs::Inputs;
 use rig_link::telemetry::{Health, TelemetryRow};
 use static_cell::StaticCell;
 
@@ -51,6 +52,8 @@ pub enum Order {
     CaptureArm(CaptureTrigger),
     /// Trigger the capture.
     CaptureTrigger,
+    /// The raw readings of this tick, into their queue.
+    Inputs,
 }
 
 /// What came of an order.
@@ -67,6 +70,8 @@ pub struct Ends {
     pub orders: Producer<'static, Order>,
     /// Answers to them, in order.
     pub answers: Consumer<'static, Carried>,
+    /// Raw readings that were ordered.
+    pub inputs: Consumer<'static, Inputs>,
     /// Telemetry.
     pub rows: Consumer<'static, TelemetryRow>,
     /// Health.
@@ -80,6 +85,7 @@ struct Tick {
     state: ControlState,
     orders: Consumer<'static, Order>,
     answers: Producer<'static, Carried>,
+    inputs: Producer<'static, Inputs>,
     rows: Producer<'static, TelemetryRow>,
     health_out: Producer<'static, Health>,
     events: Producer<'static, Event>,
@@ -90,6 +96,8 @@ struct Tick {
     late: bool,
     /// Period in which the encoders of the last tick were latched.
     period: u32,
+    /// Codes put out in the last tick.
+    dac: [u16; 2],
     /// Cycle counter at the begin of the last tick that a scan started; none after one that no scan started.
     started: Option<u32>,
     every_ticks: u16,
@@ -138,11 +146,13 @@ pub fn link_heard() {
 pub fn start(config: ControlConfig, state: ControlState) -> Ends {
     static ORDERS: StaticCell<Queue<Order, 4>> = StaticCell::new();
     static ANSWERS: StaticCell<Queue<Carried, 4>> = StaticCell::new();
+    static INPUTS: StaticCell<Queue<Inputs, 2>> = StaticCell::new();
     static ROWS_QUEUE: StaticCell<Queue<TelemetryRow, ROWS>> = StaticCell::new();
     static HEALTH: StaticCell<Queue<Health, 4>> = StaticCell::new();
     static EVENTS_QUEUE: StaticCell<Queue<Event, EVENTS>> = StaticCell::new();
     let (order_end, orders) = ORDERS.init(Queue::new()).split();
     let (answers, answer_end) = ANSWERS.init(Queue::new()).split();
+    let (inputs, input_end) = INPUTS.init(Queue::new()).split();
     let (rows, row_end) = ROWS_QUEUE.init(Queue::new()).split();
     let (health_out, health_end) = HEALTH.init(Queue::new()).split();
     let (events, event_end) = EVENTS_QUEUE.init(Queue::new()).split();
@@ -151,6 +161,7 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
         state,
         orders,
         answers,
+        inputs,
         rows,
         health_out,
         events,
@@ -159,6 +170,7 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
         ran: true,
         late: false,
         period: 0,
+        dac: [DAC_ZERO; 2],
         started: None,
         every_ticks: 0,
         until_row: 0,
@@ -181,7 +193,14 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
         unsafe { line.enable() };
     }
     adc_scan::start_timer();
-    Ends { orders: order_end, answers: answer_end, rows: row_end, health: health_end, events: event_end }
+    Ends {
+        orders: order_end,
+        answers: answer_end,
+        inputs: input_end,
+        rows: row_end,
+        health: health_end,
+        events: event_end,
+    }
 }
 
 /// The tick's state, for the two interrupts.
@@ -254,10 +273,11 @@ impl Tick {
             self.start_max = self.start_max.max(since);
         }
         if self.orders.ready() {
-            self.carry_out();
+            self.carry_out(&samples);
         }
         let outputs = step(&self.config, &mut self.state, &samples);
         outputs::write_references(outputs.dac);
+        self.dac = outputs.dac;
         outputs::write_enables(outputs.drive_enable);
         lamps(&outputs.leds);
         self.recorder.record(&samples, &outputs);
@@ -269,7 +289,7 @@ impl Tick {
     }
 
     #[cold]
-    fn carry_out(&mut self) {
+    fn carry_out(&mut self, samples: &Samples) {
         let Some(order) = self.orders.dequeue() else { return };
         let carried = match order {
             Order::Core(command) => {
@@ -295,9 +315,28 @@ impl Tick {
                 self.recorder.trigger(now());
                 Ok(())
             }
+            Order::Inputs => {
+                // Whoever ordered it empties the queue first, so there is room.
+                let _ = self.inputs.enqueue(self.raw(samples));
+                Ok(())
+            }
         };
         // The threads send one order at a time, so there is room.
         let _ = self.answers.enqueue(carried);
+    }
+
+    fn raw(&self, samples: &Samples) -> Inputs {
+        let adc = &samples.adc;
+        Inputs {
+            tick: now(),
+            codes: [adc.friction_bridge, adc.normal_bridge, adc.m1_torque, adc.m2_torque, adc.supply],
+            counts: [samples.m1_count as u16, samples.m2_count as u16],
+            dac: self.dac,
+            emergency_stop: samples.emergency_stop,
+            arm_switch: samples.arm_switch,
+            drive_fault: [samples.m1_drive_fault, samples.m2_drive_fault],
+            enabled: self.state.mode().is_live(),
+        }
     }
 
     #[inline(always)]

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod commission;
 pub mod demo;
 pub mod design;
 pub mod files;

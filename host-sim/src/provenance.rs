@@ -30,18 +30,23 @@ pub fn note_file(name: &str, bytes: &[u8]) {
 #[must_use]
 pub fn lines() -> Vec<(String, String)> {
     let command: Vec<String> = std::env::args_os().map(|word| quoted(&word.to_string_lossy())).collect();
-    let seconds = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok());
-    let seconds = seconds
-        .unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()));
     let mut lines = vec![
         ("command".to_owned(), command.join(" ")),
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        ("made".to_owned(), utc(seconds)),
+        ("made".to_owned(), now()),
     ];
     if let Ok(notes) = NOTES.lock() {
         lines.extend(notes.iter().cloned());
     }
     lines
+}
+
+/// Date and time, or those of `SOURCE_DATE_EPOCH`.
+#[must_use]
+pub fn now() -> String {
+    let seconds = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok());
+    utc(seconds
+        .unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())))
 }
 
 /// The program's name without its folder, other words with quotes where a shell wants them.

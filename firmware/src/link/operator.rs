@@ -12,6 +12,7 @@ use heapless::{String, Vec};
 use model_core::control::{Command as Core, ControlConfig, Mode, ObserverModel, PreparedExperiment, Refusal};
 use model_core::error::ParameterError;
 use model_core::selfcheck;
+use rig_link::inputs::Inputs;
 use rig_link::message::{
     Answer, CAPTURE_CHUNK, Command, Hello, KeptMessage, PROTOCOL_VERSION, Rejection, ResetCause,
 };
@@ -44,6 +45,7 @@ pub struct Operator {
     upload: Upload,
     orders: Producer<'static, Order>,
     answers: Consumer<'static, Carried>,
+    inputs: Consumer<'static, Inputs>,
 }
 
 /// Why an order to the tick was not carried out.
@@ -73,8 +75,9 @@ impl Operator {
         config: ControlConfig,
         orders: Producer<'static, Order>,
         answers: Consumer<'static, Carried>,
+        inputs: Consumer<'static, Inputs>,
     ) -> Self {
-        Self { identity, settings, config, upload: Upload::default(), orders, answers }
+        Self { identity, settings, config, upload: Upload::default(), orders, answers, inputs }
     }
 
     /// Carries out one request.
@@ -113,6 +116,7 @@ impl Operator {
             Command::SelfCheck { case, steps } => self_check(case, steps),
             Command::Restart if !drives_off() => Answer::Rejected(Rejection::NotDisabled),
             Command::Restart => restart::by_command(),
+            Command::Inputs => self.raw_inputs().await,
         }
     }
 
@@ -150,6 +154,14 @@ impl Operator {
     async fn order(&mut self, order: Order) -> Answer {
         match self.ask(order).await {
             Ok(()) => Answer::Done,
+            Err(undone) => undone.into(),
+        }
+    }
+
+    async fn raw_inputs(&mut self) -> Answer {
+        while self.inputs.dequeue().is_some() {}
+        match self.ask(Order::Inputs).await {
+            Ok(()) => self.inputs.dequeue().map_or(Answer::Rejected(Rejection::NoTick), Answer::Inputs),
             Err(undone) => undone.into(),
         }
     }

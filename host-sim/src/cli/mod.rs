@@ -3,6 +3,7 @@
 //! A subcommand is a `clap::Args` struct with `fn run(self) -> Result<(), InputError>` in its own file
 //! and one line in `Command` here.
 
+mod commission;
 pub mod common;
 mod convert;
 mod demo;
@@ -91,6 +92,7 @@ commands! {
     Run(run::Run),
     Monitor(monitor::Monitor),
     Settings(settings::Settings),
+    Commission(commission::Commission),
     Convert(convert::Convert),
     Completions(convert::Completions),
 }

@@ -61,6 +61,11 @@ impl Port {
         perform(&mut self.serial, &mut self.client, procedure, |_| {}, each)
     }
 
+    /// The port alone, for what keeps its own time.
+    pub(super) fn transport(&mut self) -> &mut dyn Transport {
+        &mut self.serial
+    }
+
     /// The port's name.
     pub(super) fn name(&self) -> String {
         self.serial.name()

@@ -87,7 +87,7 @@ pub fn perform<P: Procedure>(
 /// Keeps the rig from thinking that the host is gone. Only the procedure that started a run has one: a look at the
 /// rig must not keep a run alive whose host is gone.
 #[derive(Debug, Default)]
-pub(super) struct KeepAlive {
+pub(crate) struct KeepAlive {
     next_s: f64,
 }
 
@@ -96,7 +96,7 @@ impl KeepAlive {
     const EVERY_S: f64 = 0.1;
 
     /// Sends a sign of life where one is due.
-    pub(super) fn step(&mut self, now_s: f64, client: &mut Client) {
+    pub(crate) fn step(&mut self, now_s: f64, client: &mut Client) {
         if now_s >= self.next_s {
             client.request(rig_link::message::Command::KeepAlive);
             self.next_s = now_s + Self::EVERY_S;
@@ -105,7 +105,7 @@ impl KeepAlive {
 }
 
 /// How long to wait for an answer.
-pub(super) fn patience(command: &rig_link::message::Command) -> Duration {
+pub(crate) fn patience(command: &rig_link::message::Command) -> Duration {
     use rig_link::message::Command;
     match command {
         // May erase a sector of flash: up to 4 s by the data sheet, twice for the store's own move.

@@ -132,6 +132,7 @@ pub fn command(command: &Command) -> &'static str {
         Command::KeptMessage => "the question for the kept message",
         Command::SelfCheck { .. } => "the self-check",
         Command::Restart => "restart",
+        Command::Inputs => "the question for the raw readings",
     }
 }
 

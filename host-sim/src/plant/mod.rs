@@ -21,6 +21,7 @@ mod effects;
 mod elements;
 mod encoder;
 mod from_files;
+mod hands;
 mod linear;
 mod noise;
 pub mod parameters;
@@ -31,6 +32,7 @@ pub use analogue::PinVoltages;
 pub use effects::left_out;
 pub use elements::{ElementModel, ElementParameters, ElementState};
 pub use encoder::Edge;
+pub use hands::Hands;
 pub use parameters::PlantParameters;
 
 use analogue::{Analogue, Quantities};
@@ -114,6 +116,7 @@ pub struct Plant {
     activity: Activity,
     sweeps: Option<Vec<[Sweep; 2]>>,
     noise: Noise,
+    hands: Hands,
 }
 
 impl Plant {
@@ -137,6 +140,7 @@ impl Plant {
             activity: Activity::default(),
             sweeps: None,
             noise: Noise::new(seed),
+            hands: Hands::default(),
         })
     }
 
@@ -145,6 +149,16 @@ impl Plant {
     pub fn with_edges(mut self) -> Self {
         self.sweeps = Some(Vec::with_capacity(self.busy.substeps as usize));
         self
+    }
+
+    /// What a person does by hand.
+    pub fn hands(&mut self) -> &mut Hands {
+        &mut self.hands
+    }
+
+    /// A hand turns the disc by an angle from now on, and lets go.
+    pub fn turn_by_hand(&mut self, by_rad: f64) {
+        self.hands.turn(self.state.disc.angle_rad, by_rad);
     }
 
     /// Advances the plant by one control period and samples it at its end.
@@ -160,6 +174,7 @@ impl Plant {
     /// Advances the plant by one control period with torque commands in N·m, without sampling it.
     pub fn advance(&mut self, m1_command_nm: f64, m2_command_nm: f64) {
         let commands = [m1_command_nm, m2_command_nm];
+        let disc_nm = self.hands.disc_nm(self.state.disc.angle_rad, self.state.disc.speed_rad_s);
         // By reference: a grid holds two prepared models, and copying it each period costs more than a calm step.
         let busy = self.activity.is_busy(&self.state, commands);
         let substeps = if busy { self.busy.substeps } else { self.calm.substeps };
@@ -169,7 +184,7 @@ impl Plant {
         for k in 0..substeps {
             let from = self.sweeps.is_some().then(|| self.positions());
             let grid = if busy { &self.busy } else { &self.calm };
-            grid.advance(&self.disc, self.radius_m, &mut self.state, commands);
+            grid.advance(&self.disc, self.radius_m, &mut self.state, commands, (&self.hands, disc_nm));
             if let Some(from) = from {
                 let to = self.positions();
                 let start_s = f64::from(k) * grid.step_s;

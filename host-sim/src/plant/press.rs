@@ -17,6 +17,7 @@ use super::parameters::PlantParameters;
 pub(crate) struct Press {
     system: Held<3, 2>,
     preload_n: f64,
+    gain_n_per_nm: f64,
     radian_per_newton: f64,
 }
 
@@ -38,6 +39,7 @@ impl Press {
         Self {
             system: Held::new(&a, &b, step_s),
             preload_n: p.pressure.preload_n,
+            gain_n_per_nm: p.geometry.lever_gain_n_per_nm,
             radian_per_newton: 1.0 / p.geometry.mechanism_stiffness_n_per_rad,
         }
     }
@@ -48,8 +50,10 @@ impl Press {
     }
 
     #[inline]
-    pub(crate) fn step(&self, state: &mut PressState, command_nm: f64) {
-        state.0 = self.system.step(&state.0, &[command_nm, self.preload_n]);
+    pub(crate) fn step(&self, state: &mut PressState, command_nm: f64, hand_nm: f64) {
+        // A hand on the shaft works on the mechanism at once, without the drive's lag.
+        let held_up_n = self.preload_n - self.gain_n_per_nm * hand_nm;
+        state.0 = self.system.step(&state.0, &[command_nm, held_up_n]);
     }
 
     pub(crate) fn angle_rad(&self, state: &PressState) -> f64 {

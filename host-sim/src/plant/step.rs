@@ -13,6 +13,7 @@ use super::PERIOD_S;
 use super::bridge::{Bridge, BridgeState};
 use super::disc::{Disc, DiscState};
 use super::elements::{Elements, ElementsState};
+use super::hands::Hands;
 use super::parameters::PlantParameters;
 use super::press::{Press, PressState};
 use model_core::error::ParameterError;
@@ -76,9 +77,16 @@ impl Grid {
     }
 
     #[inline]
-    pub(super) fn advance(&self, disc: &Disc, radius_m: f64, s: &mut State, [m1_nm, m2_nm]: [f64; 2]) {
+    pub(super) fn advance(
+        &self,
+        disc: &Disc,
+        radius_m: f64,
+        s: &mut State,
+        [m1_nm, m2_nm]: [f64; 2],
+        (hands, hand_on_disc_nm): (&Hands, f64),
+    ) {
         let h = self.step_s;
-        self.press.step(&mut s.press, m1_nm);
+        self.press.step(&mut s.press, m1_nm, hands.m1_nm);
         let normal_force_n = s.press.normal_force_n();
         // ∫ τ dt of a lag: u dt + T (τ − τ⁺).
         let mut impulse = || {
@@ -88,15 +96,15 @@ impl Grid {
             impulse
         };
         let (first, second) = (impulse(), impulse());
-        disc.kick(&mut s.disc, 0.5 * h, first, s.friction_torque_nm);
+        disc.kick(&mut s.disc, 0.5 * h, first, s.friction_torque_nm - hand_on_disc_nm);
         s.sliding_speed_m_s = s.disc.speed_rad_s * radius_m;
         let (speed_m_s, angle_rad) = (s.sliding_speed_m_s, s.disc.angle_rad);
         let force = self.elements.step(&mut s.elements, speed_m_s, angle_rad, normal_force_n);
         s.friction_torque_nm = force * radius_m;
         disc.drift(&mut s.disc, h);
-        disc.kick(&mut s.disc, 0.5 * h, second, s.friction_torque_nm);
-        self.bridges[0].step(&mut s.bridges[0], s.friction_torque_nm);
-        self.bridges[1].step(&mut s.bridges[1], normal_force_n);
+        disc.kick(&mut s.disc, 0.5 * h, second, s.friction_torque_nm - hand_on_disc_nm);
+        self.bridges[0].step(&mut s.bridges[0], s.friction_torque_nm + hands.friction_load_nm);
+        self.bridges[1].step(&mut s.bridges[1], normal_force_n + hands.normal_load_n);
     }
 }
 

@@ -6,6 +6,7 @@ use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{self, Done, ObserverResidual, Request};
 use crate::firmware_build;
+use crate::serve::miswired::Mistake;
 use crate::serve::pace::Speed;
 use crate::serve::{self, Served};
 use clap::{ArgGroup, Parser};
@@ -73,6 +74,9 @@ struct Cli {
     /// With --serve: seed of the sensors' noise
     #[arg(long, value_name = "N", default_value_t = 1, requires = "serve")]
     seed: u64,
+    /// With --serve: wire the bench wrongly, to see what commissioning says; may be given several times
+    #[arg(long, value_name = "MISTAKE", requires = "serve")]
+    miswired: Vec<Mistake>,
     /// With --serve: lose every N-th row of telemetry on the way to the host, to see that it is counted
     #[arg(long, value_name = "N", default_value_t = 0, requires = "serve")]
     lose_every: u32,
@@ -179,6 +183,7 @@ fn run_service(cli: Cli) -> Result<(), BenchError> {
         speed: cli.speed,
         link: cli.link,
         arm_when_asked: cli.arm_when_asked,
+        mistakes: cli.miswired,
         lose_every: cli.lose_every,
         for_s: cli.for_s,
     };

@@ -135,14 +135,15 @@ impl BenchDriver {
 
     /// Switches and drives to their pins, voltages to their inputs.
     fn show_outside(&self, part: &mut Part, at: VirtualNanos) {
-        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, .. } = &self.outside;
-        pins::drive(part, at, pins::ARM_SWITCH, *arm_switch);
-        pins::drive(part, at, pins::STOP_RELEASED, !stop_pressed);
+        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, wiring, .. } = &self.outside;
+        pins::drive(part, at, pins::ARM_SWITCH, *arm_switch != wiring.arm_switch_inverted);
+        pins::drive(part, at, pins::STOP_RELEASED, wiring.stop_bridged || !stop_pressed);
         for (place, healthy) in pins::DRIVE_HEALTHY.into_iter().zip(healthy) {
             pins::drive(part, at, place, *healthy);
         }
+        let arriving = wiring.arriving(&self.sensors, REFERENCE_MICROVOLT / 2);
         for (index, channel) in pins::ADC_CHANNELS.into_iter().enumerate() {
-            let microvolt = held_microvolt[index].unwrap_or(self.sensors.microvolt[index]);
+            let microvolt = held_microvolt[index].unwrap_or(arriving[index]);
             part.adc1.set_input(channel, microvolt);
         }
     }
@@ -170,8 +171,13 @@ impl BenchDriver {
         for (code, wire) in inputs.dac.iter_mut().zip(self.outside.references) {
             *code = wire.pass(*code);
         }
+        let wiring = self.outside.wiring;
+        inputs.dac = wiring.followed(inputs.dac);
         let encoders = &mut part.encoders;
-        self.sensors = self.plant.step(at, &inputs, &mut |motor, edge| encoders[motor as usize].push(edge));
+        self.sensors = self.plant.step(at, &inputs, &mut |motor, edge| {
+            let plug = motor as usize;
+            encoders[if wiring.encoders_exchanged { 1 - plug } else { plug }].push(edge);
+        });
     }
 
     fn act(&mut self, action: Action, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
@@ -186,6 +192,19 @@ impl BenchDriver {
                 }
             }
             Action::EncoderLine(motor, line, level) => part.encoders[motor as usize].stick(line, level),
+            Action::EncodersExchanged(exchanged) => self.outside.wiring.encoders_exchanged = exchanged,
+            Action::BridgesExchanged(exchanged) => self.outside.wiring.bridges_exchanged = exchanged,
+            Action::BridgeReversed(bridge, reversed) => {
+                if let Some(wires) = self.outside.wiring.bridge_reversed.get_mut(bridge) {
+                    *wires = reversed;
+                }
+            }
+            Action::MotorReversed(motor, reversed) => {
+                self.outside.wiring.motor_reversed[motor as usize] = reversed;
+            }
+            Action::ArmSwitchInverted(inverted) => self.outside.wiring.arm_switch_inverted = inverted,
+            Action::StopBridged(bridged) => self.outside.wiring.stop_bridged = bridged,
+            Action::Hand(hand) => self.plant.touch(hand),
             Action::EncoderSwapped(motor, swapped) => part.encoders[motor as usize].swap(swapped),
             Action::EncoderDisturbed(motor, width_ns) => {
                 part.encoders[motor as usize].disturb(Disturbance { at: stop.at, width_ns });

@@ -23,6 +23,19 @@ impl DriveInputs {
     }
 }
 
+/// Something a person does to the rig by hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Hand {
+    /// Turns the disc by so many turns.
+    TurnDisc(f64),
+    /// Presses on M1's shaft with this torque, N·m; 0 lets go.
+    PressM1(f64),
+    /// Hangs a known torque on the friction bridge, N·m.
+    LoadFriction(f64),
+    /// Hangs a known force on the normal force bridge, N.
+    LoadNormal(f64),
+}
+
 /// What the plant shows at the end of a control period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sensors {
@@ -36,6 +49,10 @@ pub trait PlantSide: Send + Sync {
     fn sensors(&mut self) -> Sensors;
     /// One control period with these inputs, from `at` on; `edge` takes each encoder's edges in the order of time.
     fn step(&mut self, at: VirtualNanos, inputs: &DriveInputs, edge: &mut dyn FnMut(Motor, Edge)) -> Sensors;
+    /// Does something to it by hand. A plant without hands feels nothing.
+    fn touch(&mut self, hand: Hand) {
+        let _ = hand;
+    }
     /// The same plant in the same state.
     fn duplicate(&self) -> Box<dyn PlantSide>;
 }
@@ -56,6 +73,20 @@ pub enum Action {
     EncoderLine(Motor, Line, Option<bool>),
     /// A and B of an encoder are swapped, or right again.
     EncoderSwapped(Motor, bool),
+    /// The plugs of the two encoders are exchanged, or right again.
+    EncodersExchanged(bool),
+    /// The plugs of the two bridges are exchanged, or right again.
+    BridgesExchanged(bool),
+    /// The signal wires of a bridge, friction (0) or normal force (1), are exchanged, or right again.
+    BridgeReversed(usize, bool),
+    /// The motor turns the other way than its drive believes, or right again: two of its phases are exchanged.
+    MotorReversed(Motor, bool),
+    /// The arm switch opens where it should close, or is right again.
+    ArmSwitchInverted(bool),
+    /// The emergency stop's contact is bridged: it reads released whatever is pressed; or whole again.
+    StopBridged(bool),
+    /// Somebody does something by hand.
+    Hand(Hand),
     /// Pulses of this width, in ns, are coupled into both lines of an encoder.
     EncoderDisturbed(Motor, u64),
     /// The wire of a torque reference between amplifier and drive.
@@ -147,6 +178,59 @@ pub struct Outside {
     pub held_microvolt: [Option<u32>; 5],
     /// Wires of the torque references.
     pub references: [ReferenceWire; 2],
+    /// What else is wired wrongly.
+    pub wiring: Wiring,
+}
+
+/// Plugs and wires in the wrong place; all false: right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wiring {
+    /// The plugs of the encoders.
+    pub encoders_exchanged: bool,
+    /// The plugs of the bridges.
+    pub bridges_exchanged: bool,
+    /// The signal wires of the bridges, friction and normal force.
+    pub bridge_reversed: [bool; 2],
+    /// Two phases of a motor.
+    pub motor_reversed: [bool; 2],
+    /// The arm switch opens where it should close.
+    pub arm_switch_inverted: bool,
+    /// The emergency stop reads released whatever is pressed.
+    pub stop_bridged: bool,
+}
+
+impl Wiring {
+    /// What arrives at the analogue inputs of what the plant shows, µV; a bridge's amplifier works about `middle`.
+    #[must_use]
+    pub fn arriving(&self, sensors: &Sensors, middle: u32) -> [u32; 5] {
+        let mut microvolt = sensors.microvolt;
+        for (bridge, reversed) in self.bridge_reversed.iter().enumerate() {
+            if *reversed {
+                microvolt[bridge] = (2 * middle).saturating_sub(microvolt[bridge]);
+            }
+        }
+        for (motor, reversed) in self.motor_reversed.iter().enumerate() {
+            // The drive's monitor is its own current: it shows the torque that the drive believes in.
+            if *reversed {
+                microvolt[2 + motor] = (2 * middle).saturating_sub(microvolt[2 + motor]);
+            }
+        }
+        if self.bridges_exchanged {
+            microvolt.swap(0, 1);
+        }
+        microvolt
+    }
+
+    /// The torque references as the motors follow them.
+    #[must_use]
+    pub fn followed(&self, mut dac: [Option<u16>; 2]) -> [Option<u16>; 2] {
+        for (code, reversed) in dac.iter_mut().zip(self.motor_reversed) {
+            if reversed {
+                *code = ReferenceWire::Reversed.pass(*code);
+            }
+        }
+        dac
+    }
 }
 
 impl Default for Outside {
@@ -157,6 +241,7 @@ impl Default for Outside {
             healthy: [true; 2],
             held_microvolt: [None; 5],
             references: Default::default(),
+            wiring: Wiring::default(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! host-sim's plant behind the chip's pins.
 
 use crate::driver::PERIOD;
-use crate::outside::{DriveInputs, PlantSide, Sensors};
+use crate::outside::{DriveInputs, Hand, PlantSide, Sensors};
 use crate::part::Motor;
 use crate::part::encoder_timer::Edge;
 use host_sim::input_error::InputError;
@@ -56,6 +56,15 @@ impl PlantSide for HostPlant {
             }
         }
         sensors(&output.pins)
+    }
+
+    fn touch(&mut self, hand: Hand) {
+        match hand {
+            Hand::TurnDisc(turns) => self.plant.turn_by_hand(turns * std::f64::consts::TAU),
+            Hand::PressM1(torque_nm) => self.plant.hands().m1_nm = torque_nm,
+            Hand::LoadFriction(torque_nm) => self.plant.hands().friction_load_nm = torque_nm,
+            Hand::LoadNormal(force_n) => self.plant.hands().normal_load_n = force_n,
+        }
     }
 
     fn duplicate(&self) -> Box<dyn PlantSide> {

@@ -8,6 +8,7 @@
 //! | [`program`] | the upload of an experiment |
 //! | [`model`] | the upload of the observer's model |
 //! | [`settings`] | key, name and unit of each setting |
+//! | [`inputs`] | raw readings of one tick, for commissioning |
 //! | [`capture`] | rows of the triggered capture |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -15,6 +16,7 @@
 pub mod capture;
 mod convert;
 pub mod frame;
+pub mod inputs;
 pub mod message;
 pub mod model;
 pub mod program;

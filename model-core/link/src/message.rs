@@ -6,6 +6,7 @@
 //! [`PROTOCOL_VERSION`] rises when an old one changes.
 
 use crate::capture::{CaptureInfo, CaptureTrigger};
+use crate::inputs::Inputs;
 use crate::model::ModelRecord;
 use crate::program::{ProgramHeader, ProgramSegment};
 use crate::settings::SettingState;
@@ -110,6 +111,8 @@ pub enum Command {
     },
     /// Restart the firmware; only while disabled.
     Restart,
+    /// Raw readings of this tick.
+    Inputs,
 }
 
 impl Command {
@@ -178,6 +181,8 @@ pub enum Answer {
         /// Digest over the bits of all results.
         digest: u64,
     },
+    /// Raw readings.
+    Inputs(Inputs),
 }
 
 /// Why a request was not carried out before it reached the supervisor.

@@ -1,11 +1,15 @@
 //! What the person at the bench types: one key, one deed; in a pipe one character.
 
+use crate::part::Motor;
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 use std::io::{IsTerminal, Read, stdin};
 use std::sync::mpsc::{Receiver, channel};
 
 /// What the keys do, as shown to the person.
-pub const HELP: &str = "keys: a arm switch off/on   e or space emergency stop press/release   d drive fault of M2 on/off   \
+pub const HELP: &str = "keys: a arm switch off/on   e or space emergency stop press/release   \
+x drive fault of M1 on/off   d drive fault of M2 on/off   1 friction bridge unplugged/plugged in   \
+2 normal force bridge unplugged/plugged in   t turn the disc by hand, one turn forward   \
+m press M1 by hand/let go   f next weight on the torque ring   n next weight on the frame   \
 u link unplugged/plugged in   r reset   p power off/on   ? help   q quit";
 
 /// A deed at the bench.
@@ -15,8 +19,18 @@ pub enum Key {
     ArmSwitch,
     /// Press the emergency stop, or release it.
     EmergencyStop,
-    /// M2's drive reports a fault, or none.
-    DriveFault,
+    /// A drive reports a fault, or none.
+    DriveFault(Motor),
+    /// A bridge's plug is pulled, or put in: friction (0), normal force (1).
+    BridgePlug(usize),
+    /// Turn the disc one turn forward by hand.
+    TurnDisc,
+    /// Press on M1's shaft, or let go.
+    PressM1,
+    /// Hang the next weight on the torque ring, after the last one none.
+    FrictionWeight,
+    /// Hang the next weight on the frame, after the last one none.
+    NormalWeight,
     /// Pull the link's plug, or put it in.
     Link,
     /// Pull the reset pin.
@@ -36,7 +50,14 @@ impl Key {
         Some(match character.to_ascii_lowercase() {
             b'a' => Self::ArmSwitch,
             b'e' | b' ' => Self::EmergencyStop,
-            b'd' => Self::DriveFault,
+            b'x' => Self::DriveFault(Motor::M1),
+            b'd' => Self::DriveFault(Motor::M2),
+            b'1' => Self::BridgePlug(0),
+            b'2' => Self::BridgePlug(1),
+            b't' => Self::TurnDisc,
+            b'm' => Self::PressM1,
+            b'f' => Self::FrictionWeight,
+            b'n' => Self::NormalWeight,
             b'u' => Self::Link,
             b'r' => Self::Reset,
             b'p' => Self::Power,
@@ -102,10 +123,10 @@ mod tests {
     fn every_key_in_the_help_does_something_and_line_ends_do_nothing() {
         let named: Vec<u8> =
             HELP.split("   ").map(|part| part.trim_start_matches("keys: ").as_bytes()[0]).collect();
-        assert_eq!(named.len(), 8);
+        assert_eq!(named.len(), 15);
         let mut deeds: Vec<Key> = named.iter().map(|key| Key::of(*key).unwrap()).collect();
         deeds.dedup();
-        assert_eq!(deeds.len(), 8);
+        assert_eq!(deeds.len(), 15);
         assert_eq!((Key::of(b'\n'), Key::of(b' ')), (None, Some(Key::EmergencyStop)));
     }
 }

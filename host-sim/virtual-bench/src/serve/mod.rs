@@ -2,6 +2,7 @@
 //! goes to stdout, and the keyboard is what a person would touch at the rig.
 
 pub mod keys;
+pub mod miswired;
 pub mod pace;
 pub mod port;
 pub mod traffic;
@@ -13,11 +14,11 @@ use crate::desk_link::perform;
 use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{boot, preparation};
-use crate::outside::Action;
-use crate::part::Motor;
+use crate::outside::{Action, Hand};
 use crate::plant_side::HostPlant;
 use defmt_decoder::{StreamDecoder, Table};
 use host_sim::cli::common::say;
+use host_sim::commission::{FRICTION_LOADS_NM, NORMAL_LOADS_N};
 use host_sim::files::experiment_file::PlantOptions;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
@@ -26,6 +27,7 @@ use host_sim::link::client::Client;
 use host_sim::link::words;
 use host_sim::plant::PlantParameters;
 use keys::{HELP, Key, Keyboard};
+use miswired::{Mistake, OPEN_MICROVOLT};
 use pace::{Pace, Speed};
 use port::Pty;
 use std::path::PathBuf;
@@ -38,6 +40,8 @@ use traffic::Traffic;
 const LOOK_NS: u64 = 1_000_000;
 /// How long the arm switch stays off before a willing person turns it on again.
 const SWITCH_NS: u64 = 20_000_000;
+/// What a hand on M1's shaft gives: 22 N at the contact of the assumed rig.
+const PRESS_NM: f64 = 1.0;
 
 /// What is served.
 #[derive(Debug)]
@@ -56,6 +60,8 @@ pub struct Served {
     pub link: Option<PathBuf>,
     /// Turn the arm switch off and on whenever the rig asks for it.
     pub arm_when_asked: bool,
+    /// What is wired wrongly.
+    pub mistakes: Vec<Mistake>,
     /// Lose every so many-th row of telemetry, 0 for none.
     pub lose_every: u32,
     /// End by itself after so many seconds of the bench's time.
@@ -76,6 +82,7 @@ pub fn serve(firmware: &Firmware, served: &Served) -> Result<(), BenchError> {
         .map_err(|error| BenchError::Port(format!("signals cannot be caught: {error}")))?;
     let mut pty = Pty::open()?;
     bench::run(firmware, Box::new(plant), |desk| {
+        served.mistakes.iter().try_for_each(|mistake| desk.act(mistake.action()))?;
         boot(desk)?;
         let wanted = preparation(&served.rig, &served.observer, false)?;
         if !wanted.is_empty() {
@@ -113,7 +120,12 @@ struct Service<'a> {
 struct Switches {
     armed: bool,
     stop_pressed: bool,
-    drive_fault: bool,
+    drive_fault: [bool; 2],
+    bridge_pulled: [bool; 2],
+    pressing: bool,
+    /// How many of the weights hang there: none, the first, …
+    friction_weight: usize,
+    normal_weight: usize,
     unplugged: bool,
     unpowered: bool,
 }
@@ -207,10 +219,40 @@ impl<'a> Service<'a> {
                 tell(if x.stop_pressed { "emergency stop pressed" } else { "emergency stop released" });
                 desk.act(Action::EmergencyStop(x.stop_pressed))
             }
-            Key::DriveFault => {
-                x.drive_fault = !x.drive_fault;
-                tell(if x.drive_fault { "M2's drive reports a fault" } else { "M2's drive is healthy" });
-                desk.act(Action::DriveHealthy(Motor::M2, !x.drive_fault))
+            Key::DriveFault(motor) => {
+                let fault = &mut x.drive_fault[motor as usize];
+                *fault = !*fault;
+                tell(&format!(
+                    "the drive of {motor:?} {}",
+                    if *fault { "reports a fault" } else { "is healthy" }
+                ));
+                desk.act(Action::DriveHealthy(motor, !*fault))
+            }
+            Key::BridgePlug(bridge) => {
+                let pulled = &mut x.bridge_pulled[bridge];
+                *pulled = !*pulled;
+                let name = ["friction", "normal force"][bridge];
+                tell(&format!("{name} bridge {}", if *pulled { "unplugged" } else { "plugged in" }));
+                desk.act(Action::AnalogueInput(bridge, pulled.then_some(OPEN_MICROVOLT)))
+            }
+            Key::TurnDisc => {
+                tell("a hand turns the disc one turn forward, in two seconds");
+                desk.act(Action::Hand(Hand::TurnDisc(1.0)))
+            }
+            Key::PressM1 => {
+                x.pressing = !x.pressing;
+                tell(if x.pressing { "a hand presses M1" } else { "the hand lets M1 go" });
+                desk.act(Action::Hand(Hand::PressM1(if x.pressing { PRESS_NM } else { 0.0 })))
+            }
+            Key::FrictionWeight => {
+                let load = next(&mut x.friction_weight, &FRICTION_LOADS_NM);
+                tell(&format!("on the torque ring: {load} N m"));
+                desk.act(Action::Hand(Hand::LoadFriction(load)))
+            }
+            Key::NormalWeight => {
+                let load = next(&mut x.normal_weight, &NORMAL_LOADS_N);
+                tell(&format!("on the frame: {load} N"));
+                desk.act(Action::Hand(Hand::LoadNormal(load)))
             }
             Key::Link => {
                 x.unplugged = !x.unplugged;
@@ -264,4 +306,10 @@ impl<'a> Service<'a> {
             eprintln!("virtual-bench: the host does not read: {lost} bytes lost so far");
         }
     }
+}
+
+/// The next of the weights, or none after the last.
+fn next(hangs: &mut usize, weights: &[f64]) -> f64 {
+    *hangs = (*hangs + 1) % (weights.len() + 1);
+    hangs.checked_sub(1).and_then(|weight| weights.get(weight)).copied().unwrap_or_default()
 }

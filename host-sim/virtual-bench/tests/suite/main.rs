@@ -3,6 +3,7 @@
 
 mod bits;
 mod chain;
+mod commission;
 mod cost;
 mod defmt;
 mod faults;

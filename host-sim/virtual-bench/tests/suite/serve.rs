@@ -17,17 +17,23 @@ use std::process::{Child, Command, Stdio};
 use virtual_bench::firmware_build;
 
 /// A served bench, as long as this lives.
-struct Board {
-    bench: Child,
+pub(super) struct Board {
+    pub(super) bench: Child,
     lines: BufReader<std::process::ChildStdout>,
-    link: PathBuf,
+    pub(super) link: PathBuf,
 }
 
 impl Board {
+    /// A bench whose arm switch is turned when the rig asks for it.
     fn new(name: &str, more: &[&str]) -> Self {
+        Self::alone(name, &[&["--arm-when-asked"], more].concat())
+    }
+
+    /// A bench at which nothing happens by itself.
+    pub(super) fn alone(name: &str, more: &[&str]) -> Self {
         let link = std::env::temp_dir().join(format!("rig-serve-{name}-{}", std::process::id()));
         let mut bench = Command::new(env!("CARGO_BIN_EXE_virtual-bench"))
-            .args(["--serve", "--speed", "max", "--arm-when-asked", "--link"])
+            .args(["--serve", "--speed", "max", "--link"])
             .arg(&link)
             .arg("--elf")
             .arg(firmware_build::release_elf().unwrap())
