@@ -1,9 +1,9 @@
-//! Runs the firmware with an operator at the desk.
+//! Runs the firmware with an operator at the co-simulation endpoint.
 
 use crate::board::RigBoard;
-use crate::desk::{Desk, desk};
 use crate::driver::{Addresses, BenchDriver, NothingMore, PERIOD};
 use crate::elf::Firmware;
+use crate::endpoint::{Endpoint, endpoint};
 use crate::error::BenchError;
 use crate::gaps;
 use crate::outside::{Outside, PlantSide};
@@ -23,16 +23,16 @@ pub struct Outcome<T> {
     pub record: Record,
 }
 
-/// Powers the board up with `plant` behind it and lets `operator` work at the desk until it returns.
+/// Powers the board up with `plant` behind it and lets `operator` work at the endpoint until it returns.
 ///
 /// # Errors
 /// The operator's error; else the emulator's; else the gaps, if the firmware met any.
 pub fn run<T: Send>(
     firmware: &Firmware,
     plant: Box<dyn PlantSide>,
-    operator: impl FnOnce(&mut Desk) -> Result<T, BenchError> + Send,
+    operator: impl FnOnce(&mut Endpoint) -> Result<T, BenchError> + Send,
 ) -> Result<Outcome<T>, BenchError> {
-    let (desk, end) = desk();
+    let (endpoint, end) = endpoint();
     let driver = BenchDriver::new(Addresses::of(firmware), plant, Outside::default(), end);
     let mut board = RigBoard::new().map_err(emulator_error)?;
     driver.wire_up(&mut board.part);
@@ -41,7 +41,7 @@ pub fn run<T: Send>(
         session.watch(Watch::Instruction(*handler));
     }
     let start = Start::new(&firmware.images);
-    work(session, &start, driver, desk, operator)
+    work(session, &start, driver, endpoint, operator)
 }
 
 /// Goes on from `saved` with another operator. `scratch` is a directory for a temporary file.
@@ -52,9 +52,9 @@ pub fn run_on<T: Send>(
     firmware: &Firmware,
     saved: &Saved,
     scratch: &Path,
-    operator: impl FnOnce(&mut Desk) -> Result<T, BenchError> + Send,
+    operator: impl FnOnce(&mut Endpoint) -> Result<T, BenchError> + Send,
 ) -> Result<Outcome<T>, BenchError> {
-    let (desk, end) = desk();
+    let (endpoint, end) = endpoint();
     let driver = BenchDriver::resumed(Addresses::of(firmware), saved, end);
     let board = RigBoard::new().map_err(emulator_error)?;
     let mut session = Session::new(Box::new(board), 0, VirtualNanos(PERIOD)).map_err(emulator_error)?;
@@ -70,23 +70,23 @@ pub fn run_on<T: Send>(
     session.run_until(VirtualNanos(saved.next));
     let mut start = Start::new(&firmware.images);
     start.resume = Some(&resume);
-    work(session, &start, driver, desk, operator)
+    work(session, &start, driver, endpoint, operator)
 }
 
 fn work<T: Send>(
     session: Session<RigBoard>,
     start: &Start<'_>,
     driver: BenchDriver,
-    mut desk: Desk,
-    operator: impl FnOnce(&mut Desk) -> Result<T, BenchError> + Send,
+    mut endpoint: Endpoint,
+    operator: impl FnOnce(&mut Endpoint) -> Result<T, BenchError> + Send,
 ) -> Result<Outcome<T>, BenchError> {
     let (done, finished) = std::thread::scope(|scope| {
         let operator = scope.spawn(move || {
-            desk.sit_down()?;
-            operator(&mut desk)
+            endpoint.connect()?;
+            operator(&mut endpoint)
         });
         let finished = emulator::run(session, start, driver);
-        // Without the emulator's end of the desk the operator does not wait for ever.
+        // Without the emulator's end of the endpoint the operator does not wait for ever.
         let finished = finished.map(|finished| {
             let gaps = gaps::found(&finished.session);
             (gaps, finished.driver.into_record())

@@ -6,8 +6,8 @@
 //! over the period. So what a tick computes from the samples of one period acts from the start of the next: one
 //! control period of delay, as in the PC rig.
 
-use crate::desk::{BenchEnd, Question, ToBench, ToDesk};
 use crate::elf::Firmware;
+use crate::endpoint::{BenchEnd, Question, ToBench, ToEndpoint};
 use crate::meter::{Meter, Moment};
 use crate::outside::{Action, DriveInputs, Outside, PlantSide, Sensors};
 use crate::part::Part;
@@ -296,12 +296,12 @@ impl BenchDriver {
         }
         if self.wakes_at.take().is_some() {
             let bytes = std::mem::take(&mut self.received);
-            if self.end.to_desk.send(ToDesk::Woken { now: stop.at.0, bytes }).is_err() {
+            if self.end.to_endpoint.send(ToEndpoint::Woken { now: stop.at.0, bytes }).is_err() {
                 return false;
             }
         }
         loop {
-            let Ok(message) = self.end.from_desk.recv() else { return false };
+            let Ok(message) = self.end.from_endpoint.recv() else { return false };
             match message {
                 ToBench::Wait(until) => {
                     self.wakes_at = Some(until);
@@ -311,7 +311,7 @@ impl BenchDriver {
                 ToBench::Act(action) => self.act(action, session, stop, host),
                 ToBench::Ask(question) => {
                     let answer = self.answer(question, session, stop, host);
-                    if self.end.to_desk.send(answer).is_err() {
+                    if self.end.to_endpoint.send(answer).is_err() {
                         return false;
                     }
                 }
@@ -325,17 +325,17 @@ impl BenchDriver {
         session: &mut Session<RigBoard>,
         stop: Stop,
         host: &mut dyn Host,
-    ) -> ToDesk {
+    ) -> ToEndpoint {
         let part = &mut session.board_mut().part;
         match question {
             Question::BeginMeasuring => {
                 self.meter.begin();
-                ToDesk::Done(Ok(()))
+                ToEndpoint::Done(Ok(()))
             }
-            Question::EndMeasuring => ToDesk::Measured(Box::new(self.meter.end())),
-            Question::Outputs => ToDesk::Outputs(Self::outputs(part, stop.at)),
-            Question::WrongPins => ToDesk::WrongPins(pins::wrong_modes(part, stop.at)),
-            Question::Memory { address, length } => ToDesk::Memory(
+            Question::EndMeasuring => ToEndpoint::Measured(Box::new(self.meter.end())),
+            Question::Outputs => ToEndpoint::Outputs(Self::outputs(part, stop.at)),
+            Question::WrongPins => ToEndpoint::WrongPins(pins::wrong_modes(part, stop.at)),
+            Question::Memory { address, length } => ToEndpoint::Memory(
                 (address..address + length)
                     .step_by(8)
                     .map_while(|at| host.read(at, Width::W64).ok())
@@ -344,12 +344,12 @@ impl BenchDriver {
             ),
             Question::TakeLog => {
                 self.record.outputs.clear();
-                ToDesk::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
+                ToEndpoint::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
             }
-            Question::Register(address) => ToDesk::Register(interference::read(part, stop.at, address)),
+            Question::Register(address) => ToEndpoint::Register(interference::read(part, stop.at, address)),
             Question::Snapshot => {
                 let taken = snapshot::take(session, host, stop, &self.addresses.digest, &NothingMore);
-                ToDesk::Done(taken.map_err(|error| error.to_string()).map(|taken| {
+                ToEndpoint::Done(taken.map_err(|error| error.to_string()).map(|taken| {
                     self.record.saved = Some(Saved {
                         file: taken.file,
                         plant: self.plant.duplicate(),

@@ -2,9 +2,9 @@
 
 use crate::bench::{self, Outcome};
 use crate::defmt_log::{self, DefmtLog};
-use crate::desk::Desk;
-use crate::desk_link::perform;
 use crate::elf::Firmware;
+use crate::endpoint::Endpoint;
+use crate::endpoint_link::perform;
 use crate::error::BenchError;
 use crate::full_rate;
 use crate::meter::Ticks;
@@ -239,14 +239,14 @@ pub fn run_with_plant(
     plant: Box<dyn PlantSide>,
     progress: impl FnMut(u32, u32) + Send,
 ) -> Result<Done, BenchError> {
-    let outcome = bench::run(firmware, plant, |desk| operate(desk, request, progress))?;
+    let outcome = bench::run(firmware, plant, |endpoint| operate(endpoint, request, progress))?;
     let Outcome { operator: Operated { run, ticks, captured }, record } = outcome;
     let log = defmt_log::decode(&firmware.bytes, &record.log)?;
     Ok(Done { run, ticks, captured, log, record })
 }
 
 fn operate(
-    desk: &mut Desk,
+    endpoint: &mut Endpoint,
     request: &Request,
     mut progress: impl FnMut(u32, u32),
 ) -> Result<Operated, BenchError> {
@@ -254,10 +254,10 @@ fn operate(
     let total = experiment.duration_ticks;
     let every_ticks = u16::try_from(TICK_HZ / request.experiment.log_rate_hz.max(1)).unwrap_or(u16::MAX);
     let mut client = Client::new();
-    boot(desk)?;
+    boot(endpoint)?;
     let preparation = request.preparation()?;
     if !preparation.is_empty() {
-        let answers = perform(desk, &mut client, &mut Ask::new(preparation), |_, _, _| Ok(()))?;
+        let answers = perform(endpoint, &mut client, &mut Ask::new(preparation), |_, _, _| Ok(()))?;
         answers.iter().try_for_each(words::accepted)?;
     }
     let mut capture_at = None;
@@ -269,17 +269,17 @@ fn operate(
     let mut ticks = None;
     let mut switch = ArmSwitch::default();
     let mut measuring = false;
-    let run = perform(desk, &mut client, &mut procedure, |desk, client, procedure| {
+    let run = perform(endpoint, &mut client, &mut procedure, |endpoint, client, procedure| {
         if procedure.wants_arm_switch() {
-            switch.turn(desk)?;
+            switch.turn(endpoint)?;
         }
         let done = procedure.progress_ticks();
         if done > 0 && !measuring {
             measuring = true;
-            desk.begin_measuring()?;
+            endpoint.begin_measuring()?;
         }
         if measuring && ticks.is_none() && done + u32::from(every_ticks) >= total {
-            ticks = Some(desk.end_measuring()?);
+            ticks = Some(endpoint.end_measuring()?);
         }
         if capture_at.is_some_and(|at| done >= at) {
             capture_at = None;
@@ -290,10 +290,10 @@ fn operate(
     })?;
     let ticks = match ticks {
         Some(ticks) => ticks,
-        None => desk.end_measuring()?,
+        None => endpoint.end_measuring()?,
     };
     let captured = if request.capture && run.fault.is_none() {
-        Some(perform(desk, &mut client, &mut ReadCapture::new(None), |_, _, _| Ok(()))?)
+        Some(perform(endpoint, &mut client, &mut ReadCapture::new(None), |_, _, _| Ok(()))?)
     } else {
         None
     };
@@ -324,15 +324,15 @@ impl ArmSwitch {
     ///
     /// # Errors
     /// The run ended.
-    pub fn turn(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+    pub fn turn(&mut self, endpoint: &mut Endpoint) -> Result<(), BenchError> {
         match self.on_at {
             None => {
-                self.on_at = Some(desk.now_ns() + SWITCH_NS);
-                desk.act(Action::ArmSwitch(false))
+                self.on_at = Some(endpoint.now_ns() + SWITCH_NS);
+                endpoint.act(Action::ArmSwitch(false))
             }
-            Some(at) if desk.now_ns() >= at && !self.on => {
+            Some(at) if endpoint.now_ns() >= at && !self.on => {
                 self.on = true;
-                desk.act(Action::ArmSwitch(true))
+                endpoint.act(Action::ArmSwitch(true))
             }
             Some(_) => Ok(()),
         }
@@ -343,9 +343,9 @@ impl ArmSwitch {
 ///
 /// # Errors
 /// The run ended, or a pin is not set up as the board needs it.
-pub fn boot(desk: &mut Desk) -> Result<(), BenchError> {
-    desk.wait_until(BOOT_NS)?;
-    let wrong = desk.wrong_pins()?;
+pub fn boot(endpoint: &mut Endpoint) -> Result<(), BenchError> {
+    endpoint.wait_until(BOOT_NS)?;
+    let wrong = endpoint.wrong_pins()?;
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Firmware(wrong.join("; "))) }
 }
 

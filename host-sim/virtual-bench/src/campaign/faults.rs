@@ -4,9 +4,9 @@ use super::witness::Witness;
 use super::{PROMISED_NS, Verdict};
 use crate::bench;
 use crate::defmt_log;
-use crate::desk::Desk;
 use crate::driver::PERIOD;
 use crate::elf::Firmware;
+use crate::endpoint::Endpoint;
 use crate::error::BenchError;
 use crate::outside::Action;
 use crate::part::Motor;
@@ -160,25 +160,25 @@ struct Seen {
     kept: Option<KeptMessage>,
 }
 
-fn operate(desk: &mut Desk, case: &Case) -> Result<Seen, BenchError> {
+fn operate(endpoint: &mut Endpoint, case: &Case) -> Result<Seen, BenchError> {
     let mut witness = Witness::new();
     // A few periods of company first: the host of before is gone.
-    witness.listen(desk, desk.now_ns() + 5_000_000)?;
+    witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
     witness.lively = !case.silent;
-    let at_ns = desk.now_ns();
+    let at_ns = endpoint.now_ns();
     for action in &case.actions {
-        desk.act(*action)?;
+        endpoint.act(*action)?;
     }
     for (after_ns, action) in &case.later {
-        witness.listen(desk, at_ns + after_ns)?;
-        desk.act(*action)?;
+        witness.listen(endpoint, at_ns + after_ns)?;
+        endpoint.act(*action)?;
     }
-    witness.listen(desk, at_ns + case.known_ns + PROMISED_NS + AFTERWARDS_NS)?;
+    witness.listen(endpoint, at_ns + case.known_ns + PROMISED_NS + AFTERWARDS_NS)?;
     witness.lively = true;
-    let hello = witness.ask(desk, &Command::Hello)?;
+    let hello = witness.ask(endpoint, &Command::Hello)?;
     // Nobody at the rig, the arm switch still on: nothing may move by itself. A health record comes each 0.1 s.
-    witness.listen(desk, desk.now_ns() + AFTERWARDS_NS)?;
-    let kept = match witness.ask(desk, &Command::KeptMessage)? {
+    witness.listen(endpoint, endpoint.now_ns() + AFTERWARDS_NS)?;
+    let kept = match witness.ask(endpoint, &Command::KeptMessage)? {
         Answer::Kept(kept) => kept,
         _ => None,
     };
@@ -192,7 +192,7 @@ pub(super) fn verdict(
     scratch: &Path,
     case: &Case,
 ) -> Result<Verdict, BenchError> {
-    let outcome = bench::run_on(firmware, running, scratch, |desk| operate(desk, case))?;
+    let outcome = bench::run_on(firmware, running, scratch, |endpoint| operate(endpoint, case))?;
     let (seen, record) = (outcome.operator, outcome.record);
     let log = defmt_log::decode(&firmware.bytes, &record.log)?;
     let mut problems = Vec::new();

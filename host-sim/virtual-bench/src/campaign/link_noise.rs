@@ -20,18 +20,18 @@ const NOISE_NS: u64 = 2_000_000_000;
 const REQUESTS: u32 = 300;
 
 pub(super) fn verdict(firmware: &Firmware, running: &Saved, scratch: &Path) -> Result<Verdict, BenchError> {
-    let outcome = bench::run_on(firmware, running, scratch, |desk| {
+    let outcome = bench::run_on(firmware, running, scratch, |endpoint| {
         let mut witness = Witness::new();
-        witness.listen(desk, desk.now_ns() + 5_000_000)?;
-        desk.act(Action::LinkGarbled(DAMAGED_PER_MILLION))?;
+        witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+        endpoint.act(Action::LinkGarbled(DAMAGED_PER_MILLION))?;
         for _ in 0..REQUESTS {
             witness.send(&Command::SettingGet { key: 143 });
-            witness.listen(desk, desk.now_ns() + NOISE_NS / u64::from(REQUESTS))?;
+            witness.listen(endpoint, endpoint.now_ns() + NOISE_NS / u64::from(REQUESTS))?;
         }
-        desk.act(Action::LinkGarbled(0))?;
+        endpoint.act(Action::LinkGarbled(0))?;
         // A health record comes each 0.1 s.
         witness.health = None;
-        witness.listen(desk, desk.now_ns() + 210_000_000)?;
+        witness.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
         Ok(witness)
     })?;
     let witness = outcome.operator;

@@ -8,8 +8,8 @@
 use super::Verdict;
 use super::witness::Witness;
 use crate::bench;
-use crate::desk::Desk;
 use crate::elf::Firmware;
+use crate::endpoint::Endpoint;
 use crate::error::BenchError;
 use crate::experiment::{BOOT_NS, Request, boot};
 use crate::outside::{Action, FLASH_WORD};
@@ -52,11 +52,11 @@ pub(super) fn verdict(firmware: &Firmware, scratch: &Path) -> Result<Verdict, Be
     for cut in 0..CUTS {
         // The last ones come after the answer: then it must be the new value.
         let after_ns = stored.took_ns * cut * 5 / (CUTS * 4);
-        let seen = bench::run_on(firmware, &idle, scratch, |desk| {
+        let seen = bench::run_on(firmware, &idle, scratch, |endpoint| {
             let mut witness = Witness::new();
             witness.send(&Command::SettingSet { key: KEY, value: NEW });
-            witness.listen(desk, desk.now_ns() + after_ns)?;
-            cut_and_look(desk, &[])
+            witness.listen(endpoint, endpoint.now_ns() + after_ns)?;
+            cut_and_look(endpoint, &[])
         })?;
         judge(format!("supply cut {} µs into the store", after_ns / 1000), seen.operator);
     }
@@ -66,7 +66,7 @@ pub(super) fn verdict(firmware: &Firmware, scratch: &Path) -> Result<Verdict, Be
             .map(|(address, _, after)| Action::FlashWord(*address, *after))
             .collect();
         words.push(Action::FlashWord(*address, torn(before, after)));
-        let seen = bench::run_on(firmware, &idle, scratch, |desk| cut_and_look(desk, &words))?;
+        let seen = bench::run_on(firmware, &idle, scratch, |endpoint| cut_and_look(endpoint, &words))?;
         judge(format!("word {nth} of the record torn"), seen.operator);
     }
     if stored.words.is_empty() {
@@ -79,17 +79,17 @@ pub(super) fn verdict(firmware: &Firmware, scratch: &Path) -> Result<Verdict, Be
 
 /// The rig disabled, with one setting stored.
 fn idle(firmware: &Firmware) -> Result<Saved, BenchError> {
-    let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |desk| {
-        boot(desk)?;
+    let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |endpoint| {
+        boot(endpoint)?;
         let mut witness = Witness::new();
-        set(desk, &mut witness, FIRST).map_err(BenchError::Rig)?;
-        desk.snapshot()
+        set(endpoint, &mut witness, FIRST).map_err(BenchError::Rig)?;
+        endpoint.snapshot()
     })?;
     outcome.record.saved.ok_or_else(|| BenchError::Emulator("nothing was kept".to_owned()))
 }
 
-fn set(desk: &mut Desk, witness: &mut Witness, value: f32) -> Result<(), String> {
-    match witness.ask(desk, &Command::SettingSet { key: KEY, value }) {
+fn set(endpoint: &mut Endpoint, witness: &mut Witness, value: f32) -> Result<(), String> {
+    match witness.ask(endpoint, &Command::SettingSet { key: KEY, value }) {
         Ok(Answer::Setting(state)) if state.stored.map(f32::to_bits) == Some(value.to_bits()) => Ok(()),
         Ok(other) => Err(format!("it does not store {value}: {other:?}")),
         Err(error) => Err(error.to_string()),
@@ -97,13 +97,13 @@ fn set(desk: &mut Desk, witness: &mut Witness, value: f32) -> Result<(), String>
 }
 
 /// Stores the new value undisturbed, and sees what that does to flash.
-fn store(desk: &mut Desk) -> Result<Stored, BenchError> {
+fn store(endpoint: &mut Endpoint) -> Result<Stored, BenchError> {
     let length = SETTINGS.end - SETTINGS.start;
-    let before = desk.memory(SETTINGS.start, length)?;
-    let started = desk.now_ns();
-    set(desk, &mut Witness::new(), NEW).map_err(BenchError::Rig)?;
-    let took_ns = desk.now_ns() - started;
-    let after = desk.memory(SETTINGS.start, length)?;
+    let before = endpoint.memory(SETTINGS.start, length)?;
+    let started = endpoint.now_ns();
+    set(endpoint, &mut Witness::new(), NEW).map_err(BenchError::Rig)?;
+    let took_ns = endpoint.now_ns() - started;
+    let after = endpoint.memory(SETTINGS.start, length)?;
     let (before, _) = before.as_chunks::<FLASH_WORD>();
     let (after, _) = after.as_chunks::<FLASH_WORD>();
     let words = (SETTINGS.start..)
@@ -121,30 +121,30 @@ fn torn(before: &[u8; FLASH_WORD], after: &[u8; FLASH_WORD]) -> [u8; FLASH_WORD]
 }
 
 /// Cuts the supply, puts words into flash meanwhile, and says what the setting is after the start.
-fn cut_and_look(desk: &mut Desk, words: &[Action]) -> Result<Result<f32, String>, BenchError> {
-    desk.act(Action::Power(false))?;
-    desk.wait_until(desk.now_ns() + OFF_NS)?;
+fn cut_and_look(endpoint: &mut Endpoint, words: &[Action]) -> Result<Result<f32, String>, BenchError> {
+    endpoint.act(Action::Power(false))?;
+    endpoint.wait_until(endpoint.now_ns() + OFF_NS)?;
     for word in words {
-        desk.act(*word)?;
+        endpoint.act(*word)?;
     }
-    desk.act(Action::Power(true))?;
-    desk.wait_until(desk.now_ns() + BOOT_NS)?;
+    endpoint.act(Action::Power(true))?;
+    endpoint.wait_until(endpoint.now_ns() + BOOT_NS)?;
     let mut witness = Witness::new();
-    match witness.ask(desk, &Command::Hello)? {
+    match witness.ask(endpoint, &Command::Hello)? {
         Answer::Hello(hello) if hello.reset == ResetCause::PowerOn => {}
         other => return Ok(Err(format!("it does not say that it was powered on: {other:?}"))),
     }
     // A health record comes each 0.1 s.
-    witness.listen(desk, desk.now_ns() + 110_000_000)?;
+    witness.listen(endpoint, endpoint.now_ns() + 110_000_000)?;
     match witness.health {
         Some(health) if health.fault == 0 => {}
         other => return Ok(Err(format!("it is not free of faults: {other:?}"))),
     }
-    let value = match witness.ask(desk, &Command::SettingGet { key: KEY })? {
+    let value = match witness.ask(endpoint, &Command::SettingGet { key: KEY })? {
         Answer::Setting(state) if state.stored.map(f32::to_bits) == Some(state.active.to_bits()) => {
             state.active
         }
         other => return Ok(Err(format!("the setting is not as stored: {other:?}"))),
     };
-    Ok(set(desk, &mut witness, NEXT).map(|()| value))
+    Ok(set(endpoint, &mut witness, NEXT).map(|()| value))
 }

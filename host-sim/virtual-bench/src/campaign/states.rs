@@ -2,8 +2,8 @@
 
 use super::witness::Witness;
 use crate::bench;
-use crate::desk_link::perform;
 use crate::elf::Firmware;
+use crate::endpoint_link::perform;
 use crate::error::BenchError;
 use crate::experiment::{ArmSwitch, Request, boot};
 use crate::record::Saved;
@@ -74,22 +74,22 @@ impl State {
 
 /// Switched on, and armed if asked for.
 fn before_any(firmware: &Firmware, armed: bool) -> Result<Saved, BenchError> {
-    let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |desk| {
-        boot(desk)?;
+    let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |endpoint| {
+        boot(endpoint)?;
         let mut witness = Witness::new();
         if armed {
             let mut switch = ArmSwitch::default();
             while !switch.is_on() {
-                switch.turn(desk)?;
-                witness.listen(desk, desk.now_ns() + 5_000_000)?;
+                switch.turn(endpoint)?;
+                witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
             }
-            match witness.ask(desk, &Command::Arm)? {
+            match witness.ask(endpoint, &Command::Arm)? {
                 Answer::Done => {}
                 other => return Err(BenchError::Rig(format!("it does not arm: {other:?}"))),
             }
         }
-        witness.listen(desk, desk.now_ns() + 50_000_000)?;
-        desk.snapshot()
+        witness.listen(endpoint, endpoint.now_ns() + 50_000_000)?;
+        endpoint.snapshot()
     })?;
     outcome.record.saved.ok_or_else(nothing)
 }
@@ -98,19 +98,19 @@ fn before_any(firmware: &Firmware, armed: bool) -> Result<Saved, BenchError> {
 fn during(firmware: &Firmware, experiment: &str, tick: u32) -> Result<Saved, BenchError> {
     let request = Request::assumed(experiment)?;
     let experiment = request.experiment.for_core(&request.rig)?;
-    let outcome = bench::run(firmware, Box::new(request.plant()?), |desk| {
-        boot(desk)?;
+    let outcome = bench::run(firmware, Box::new(request.plant()?), |endpoint| {
+        boot(endpoint)?;
         let mut client = Client::new();
         let mut switch = ArmSwitch::default();
         let mut kept = false;
         let mut procedure = RunExperiment::new(experiment, RunOptions::default());
         // Whatever ends the procedure early is said below: nothing was kept.
-        let ended = perform(desk, &mut client, &mut procedure, |desk, _, procedure| {
+        let ended = perform(endpoint, &mut client, &mut procedure, |endpoint, _, procedure| {
             if procedure.wants_arm_switch() {
-                switch.turn(desk)?;
+                switch.turn(endpoint)?;
             }
             if procedure.progress_ticks() >= tick {
-                desk.snapshot()?;
+                endpoint.snapshot()?;
                 kept = true;
                 return Err(BenchError::Rig("kept".to_owned()));
             }

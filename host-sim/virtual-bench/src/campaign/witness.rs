@@ -1,6 +1,6 @@
 //! The host on the other end of the link during a fault: keeps the rig company, and remembers what it hears.
 
-use crate::desk::Desk;
+use crate::endpoint::Endpoint;
 use crate::error::BenchError;
 use host_sim::link::client::Client;
 use rig_link::message::{Answer, Command, EventKind, EventMessage, Message};
@@ -52,18 +52,18 @@ impl Witness {
     ///
     /// # Errors
     /// The run ended.
-    pub fn listen(&mut self, desk: &mut Desk, until_ns: u64) -> Result<(), BenchError> {
-        while desk.now_ns() < until_ns {
-            if self.lively && desk.now_ns() >= self.alive_at {
-                self.alive_at = desk.now_ns() + ALIVE_NS;
+    pub fn listen(&mut self, endpoint: &mut Endpoint, until_ns: u64) -> Result<(), BenchError> {
+        while endpoint.now_ns() < until_ns {
+            if self.lively && endpoint.now_ns() >= self.alive_at {
+                self.alive_at = endpoint.now_ns() + ALIVE_NS;
                 self.client.request(Command::KeepAlive);
             }
             let outgoing = self.client.take_outgoing();
             if !outgoing.is_empty() {
-                desk.send(&outgoing)?;
+                endpoint.send(&outgoing)?;
             }
             let next = until_ns.min(if self.lively { self.alive_at } else { until_ns });
-            self.client.receive(&desk.receive(next)?);
+            self.client.receive(&endpoint.receive(next)?);
             while let Some(message) = self.client.next_message() {
                 match message {
                     Message::Event(event) => self.events.push(event),
@@ -85,12 +85,12 @@ impl Witness {
     ///
     /// # Errors
     /// The run ended, or there was no answer.
-    pub fn ask(&mut self, desk: &mut Desk, command: &Command) -> Result<Answer, BenchError> {
+    pub fn ask(&mut self, endpoint: &mut Endpoint, command: &Command) -> Result<Answer, BenchError> {
         for _ in 0..3 {
             let id = self.client.request(command.clone());
-            let until = desk.now_ns() + PATIENCE_NS;
-            while desk.now_ns() < until {
-                self.listen(desk, until.min(desk.now_ns() + 1_000_000))?;
+            let until = endpoint.now_ns() + PATIENCE_NS;
+            while endpoint.now_ns() < until {
+                self.listen(endpoint, until.min(endpoint.now_ns() + 1_000_000))?;
                 if let Some(place) = self.answers.iter().position(|(other, _)| *other == id) {
                     return Ok(self.answers.swap_remove(place).1);
                 }

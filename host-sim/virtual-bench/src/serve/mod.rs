@@ -9,9 +9,9 @@ pub mod traffic;
 
 use crate::bench;
 use crate::defmt_log::{self, DefmtLog};
-use crate::desk::Desk;
-use crate::desk_link::perform;
 use crate::elf::Firmware;
+use crate::endpoint::Endpoint;
+use crate::endpoint_link::perform;
 use crate::error::BenchError;
 use crate::experiment::{boot, preparation};
 use crate::outside::{Action, Hand};
@@ -81,12 +81,12 @@ pub fn serve(firmware: &Firmware, served: &Served) -> Result<(), BenchError> {
     ctrlc::set_handler(move || by_signal.store(true, Ordering::Relaxed))
         .map_err(|error| BenchError::Port(format!("signals cannot be caught: {error}")))?;
     let mut pty = Pty::open()?;
-    bench::run(firmware, Box::new(plant), |desk| {
-        served.mistakes.iter().try_for_each(|mistake| desk.act(mistake.action()))?;
-        boot(desk)?;
+    bench::run(firmware, Box::new(plant), |endpoint| {
+        served.mistakes.iter().try_for_each(|mistake| endpoint.act(mistake.action()))?;
+        boot(endpoint)?;
         let wanted = preparation(&served.rig, &served.observer, false)?;
         if !wanted.is_empty() {
-            let answers = perform(desk, &mut Client::new(), &mut Ask::new(wanted), |_, _, _| Ok(()))?;
+            let answers = perform(endpoint, &mut Client::new(), &mut Ask::new(wanted), |_, _, _| Ok(()))?;
             answers.iter().try_for_each(words::accepted)?;
         }
         // Only now: a host that finds the link finds a rig that answers.
@@ -94,12 +94,12 @@ pub fn serve(firmware: &Firmware, served: &Served) -> Result<(), BenchError> {
             pty.link_to(link)?;
         }
         say(&format!("port: {}", pty.path().display()));
-        Service::new(served, pty, &table, desk.now_ns()).run(desk, &ended)
+        Service::new(served, pty, &table, endpoint.now_ns()).run(endpoint, &ended)
     })?;
     Ok(())
 }
 
-/// The operator at the desk.
+/// The operator at the endpoint.
 struct Service<'a> {
     served: &'a Served,
     pty: Pty,
@@ -147,22 +147,23 @@ impl<'a> Service<'a> {
         }
     }
 
-    fn run(mut self, desk: &mut Desk, ended: &AtomicBool) -> Result<(), BenchError> {
+    fn run(mut self, endpoint: &mut Endpoint, ended: &AtomicBool) -> Result<(), BenchError> {
         eprintln!("virtual-bench: {HELP}");
-        let until = self.served.for_s.map(|s| desk.now_ns() + Duration::from_secs_f64(s).as_nanos() as u64);
-        while !ended.load(Ordering::Relaxed) && until.is_none_or(|until| desk.now_ns() < until) {
-            self.serve_port(desk)?;
-            self.print_log(desk)?;
+        let until =
+            self.served.for_s.map(|s| endpoint.now_ns() + Duration::from_secs_f64(s).as_nanos() as u64);
+        while !ended.load(Ordering::Relaxed) && until.is_none_or(|until| endpoint.now_ns() < until) {
+            self.serve_port(endpoint)?;
+            self.print_log(endpoint)?;
             while let Some(key) = self.keyboard.pressed() {
                 if key == Key::Quit {
                     ended.store(true, Ordering::Relaxed);
                 }
-                self.touch(key, desk)?;
+                self.touch(key, endpoint)?;
             }
-            self.turn_switch(desk)?;
-            self.keep_pace(desk);
+            self.turn_switch(endpoint)?;
+            self.keep_pace(endpoint);
         }
-        self.print_log(desk)?;
+        self.print_log(endpoint)?;
         if self.served.lose_every > 0 {
             eprintln!("virtual-bench: {} rows of telemetry were lost on purpose", self.traffic.rows_lost());
         }
@@ -170,7 +171,7 @@ impl<'a> Service<'a> {
     }
 
     /// Bytes in both directions, and a step of the bench's time.
-    fn serve_port(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+    fn serve_port(&mut self, endpoint: &mut Endpoint) -> Result<(), BenchError> {
         match self.pty.look() {
             Some(true) => eprintln!("virtual-bench: a host has opened the port"),
             Some(false) => eprintln!("virtual-bench: the host has closed the port"),
@@ -178,9 +179,9 @@ impl<'a> Service<'a> {
         }
         let from_host = self.pty.receive();
         if !from_host.is_empty() && !self.outside.unplugged {
-            desk.send(&from_host)?;
+            endpoint.send(&from_host)?;
         }
-        let from_chip = desk.receive(desk.now_ns() + LOOK_NS)?;
+        let from_chip = endpoint.receive(endpoint.now_ns() + LOOK_NS)?;
         let through = self.traffic.pass(&from_chip);
         if !self.outside.unplugged {
             self.pty.send(&through);
@@ -188,8 +189,8 @@ impl<'a> Service<'a> {
         Ok(())
     }
 
-    fn print_log(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
-        for (start, bytes) in desk.take_log()?.iter().enumerate() {
+    fn print_log(&mut self, endpoint: &mut Endpoint) -> Result<(), BenchError> {
+        for (start, bytes) in endpoint.take_log()?.iter().enumerate() {
             if start > 0 {
                 self.decoder = self.table.new_stream_decoder();
             }
@@ -204,7 +205,7 @@ impl<'a> Service<'a> {
         Ok(())
     }
 
-    fn touch(&mut self, key: Key, desk: &mut Desk) -> Result<(), BenchError> {
+    fn touch(&mut self, key: Key, endpoint: &mut Endpoint) -> Result<(), BenchError> {
         let x = &mut self.outside;
         let tell = |what: &str| eprintln!("virtual-bench: {what}");
         match key {
@@ -212,12 +213,12 @@ impl<'a> Service<'a> {
                 x.armed = !x.armed;
                 self.arm_on_at = None;
                 tell(if x.armed { "arm switch on" } else { "arm switch off" });
-                desk.act(Action::ArmSwitch(x.armed))
+                endpoint.act(Action::ArmSwitch(x.armed))
             }
             Key::EmergencyStop => {
                 x.stop_pressed = !x.stop_pressed;
                 tell(if x.stop_pressed { "emergency stop pressed" } else { "emergency stop released" });
-                desk.act(Action::EmergencyStop(x.stop_pressed))
+                endpoint.act(Action::EmergencyStop(x.stop_pressed))
             }
             Key::DriveFault(motor) => {
                 let fault = &mut x.drive_fault[motor as usize];
@@ -226,47 +227,47 @@ impl<'a> Service<'a> {
                     "the drive of {motor:?} {}",
                     if *fault { "reports a fault" } else { "is healthy" }
                 ));
-                desk.act(Action::DriveHealthy(motor, !*fault))
+                endpoint.act(Action::DriveHealthy(motor, !*fault))
             }
             Key::BridgePlug(bridge) => {
                 let pulled = &mut x.bridge_pulled[bridge];
                 *pulled = !*pulled;
                 let name = ["friction", "normal force"][bridge];
                 tell(&format!("{name} bridge {}", if *pulled { "unplugged" } else { "plugged in" }));
-                desk.act(Action::AnalogueInput(bridge, pulled.then_some(OPEN_MICROVOLT)))
+                endpoint.act(Action::AnalogueInput(bridge, pulled.then_some(OPEN_MICROVOLT)))
             }
             Key::TurnDisc => {
                 tell("a hand turns the disc one turn forward, in two seconds");
-                desk.act(Action::Hand(Hand::TurnDisc(1.0)))
+                endpoint.act(Action::Hand(Hand::TurnDisc(1.0)))
             }
             Key::PressM1 => {
                 x.pressing = !x.pressing;
                 tell(if x.pressing { "a hand presses M1" } else { "the hand lets M1 go" });
-                desk.act(Action::Hand(Hand::PressM1(if x.pressing { PRESS_NM } else { 0.0 })))
+                endpoint.act(Action::Hand(Hand::PressM1(if x.pressing { PRESS_NM } else { 0.0 })))
             }
             Key::FrictionWeight => {
                 let load = next(&mut x.friction_weight, &FRICTION_LOADS_NM);
                 tell(&format!("on the torque ring: {load} N m"));
-                desk.act(Action::Hand(Hand::LoadFriction(load)))
+                endpoint.act(Action::Hand(Hand::LoadFriction(load)))
             }
             Key::NormalWeight => {
                 let load = next(&mut x.normal_weight, &NORMAL_LOADS_N);
                 tell(&format!("on the frame: {load} N"));
-                desk.act(Action::Hand(Hand::LoadNormal(load)))
+                endpoint.act(Action::Hand(Hand::LoadNormal(load)))
             }
             Key::Link => {
                 x.unplugged = !x.unplugged;
                 tell(if x.unplugged { "link unplugged" } else { "link plugged in" });
-                desk.act(Action::LinkSilent(x.unplugged))
+                endpoint.act(Action::LinkSilent(x.unplugged))
             }
             Key::Reset => {
                 tell("reset");
-                desk.act(Action::ResetPin)
+                endpoint.act(Action::ResetPin)
             }
             Key::Power => {
                 x.unpowered = !x.unpowered;
                 tell(if x.unpowered { "power off" } else { "power on" });
-                desk.act(Action::Power(!x.unpowered))
+                endpoint.act(Action::Power(!x.unpowered))
             }
             Key::Help => {
                 tell(HELP);
@@ -277,23 +278,23 @@ impl<'a> Service<'a> {
     }
 
     /// The willing person: off when the rig asks, on a moment later.
-    fn turn_switch(&mut self, desk: &mut Desk) -> Result<(), BenchError> {
+    fn turn_switch(&mut self, endpoint: &mut Endpoint) -> Result<(), BenchError> {
         if self.traffic.asked_for_switch() && self.served.arm_when_asked && self.arm_on_at.is_none() {
-            self.arm_on_at = Some(desk.now_ns() + SWITCH_NS);
+            self.arm_on_at = Some(endpoint.now_ns() + SWITCH_NS);
             self.outside.armed = false;
-            desk.act(Action::ArmSwitch(false))?;
+            endpoint.act(Action::ArmSwitch(false))?;
         }
-        if self.arm_on_at.is_some_and(|at| desk.now_ns() >= at) {
+        if self.arm_on_at.is_some_and(|at| endpoint.now_ns() >= at) {
             self.arm_on_at = None;
             self.outside.armed = true;
             eprintln!("virtual-bench: arm switch off and on, as asked");
-            desk.act(Action::ArmSwitch(true))?;
+            endpoint.act(Action::ArmSwitch(true))?;
         }
         Ok(())
     }
 
-    fn keep_pace(&mut self, desk: &Desk) {
-        let sleep = self.pace.sleep(self.begun.elapsed(), desk.now_ns());
+    fn keep_pace(&mut self, endpoint: &Endpoint) {
+        let sleep = self.pace.sleep(self.begun.elapsed(), endpoint.now_ns());
         if !sleep.is_zero() {
             std::thread::sleep(sleep);
         }

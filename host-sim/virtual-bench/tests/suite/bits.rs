@@ -6,7 +6,7 @@ use host_sim::link::client::Client;
 use model_core::selfcheck::{MODELS, NAMES, STEPS, run};
 use rig_link::message::{Answer, Command};
 use virtual_bench::bench;
-use virtual_bench::desk_link::perform;
+use virtual_bench::endpoint_link::perform;
 use virtual_bench::experiment::{Request, boot};
 
 #[test]
@@ -15,9 +15,9 @@ fn ten_thousand_random_steps_of_every_model_give_the_bits_they_give_on_this_comp
     let cases =
         (0..MODELS).map(|case| Command::SelfCheck { case: u8::try_from(case).unwrap(), steps: STEPS });
     let cases: Vec<Command> = cases.collect();
-    let outcome = bench::run(firmware(), Box::new(plant), |desk| {
-        boot(desk)?;
-        perform(desk, &mut Client::new(), &mut Ask::new(cases), |_, _, _| Ok(()))
+    let outcome = bench::run(firmware(), Box::new(plant), |endpoint| {
+        boot(endpoint)?;
+        perform(endpoint, &mut Client::new(), &mut Ask::new(cases), |_, _, _| Ok(()))
     })
     .unwrap();
     let expected = run(STEPS);

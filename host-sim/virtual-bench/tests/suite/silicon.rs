@@ -10,8 +10,8 @@ use virtual_bench::bench::{self, Outcome};
 use virtual_bench::campaign::states::State;
 use virtual_bench::campaign::witness::Witness;
 use virtual_bench::defmt_log;
-use virtual_bench::desk::Desk;
 use virtual_bench::elf::Firmware;
+use virtual_bench::endpoint::Endpoint;
 use virtual_bench::error::BenchError;
 use virtual_bench::experiment::{self, Request};
 use virtual_bench::firmware_build;
@@ -28,28 +28,28 @@ fn kept(state: State) -> &'static Saved {
 /// Goes on from a state.
 fn from<T: Send>(
     state: State,
-    operator: impl FnOnce(&mut Desk, &mut Witness) -> Result<T, BenchError> + Send,
+    operator: impl FnOnce(&mut Endpoint, &mut Witness) -> Result<T, BenchError> + Send,
 ) -> Outcome<T> {
-    bench::run_on(firmware(), kept(state), &std::env::temp_dir(), |desk| {
+    bench::run_on(firmware(), kept(state), &std::env::temp_dir(), |endpoint| {
         let mut witness = Witness::new();
-        operator(desk, &mut witness)
+        operator(endpoint, &mut witness)
     })
     .unwrap()
 }
 
 /// Waits two health records long, and gives the last.
-fn health(desk: &mut Desk, witness: &mut Witness) -> Result<Health, BenchError> {
+fn health(endpoint: &mut Endpoint, witness: &mut Witness) -> Result<Health, BenchError> {
     witness.health = None;
-    witness.listen(desk, desk.now_ns() + 210_000_000)?;
+    witness.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
     witness.health.ok_or_else(|| BenchError::Rig("it does not tell its health".to_owned()))
 }
 
 #[test]
 fn ticks_come_once_a_period_though_the_write_that_acknowledges_it_is_posted() {
-    let ticks = from(State::Armed, |desk, _| {
-        desk.begin_measuring()?;
-        desk.wait_until(desk.now_ns() + 100_000_000)?;
-        desk.end_measuring()
+    let ticks = from(State::Armed, |endpoint, _| {
+        endpoint.begin_measuring()?;
+        endpoint.wait_until(endpoint.now_ns() + 100_000_000)?;
+        endpoint.end_measuring()
     })
     .operator;
     assert_eq!((ticks.instructions.count, ticks.late), (1000, 0), "control ticks in a tenth of a second");
@@ -57,14 +57,14 @@ fn ticks_come_once_a_period_though_the_write_that_acknowledges_it_is_posted() {
 
 #[test]
 fn interrupts_masked_over_the_end_of_a_period_make_no_tick_more_or_less() {
-    let (before, ticks, after) = from(State::Sliding, |desk, witness| {
-        let before = health(desk, witness)?;
+    let (before, ticks, after) = from(State::Sliding, |endpoint, witness| {
+        let before = health(endpoint, witness)?;
         // From 2 µs before the end of the period to 8 µs into the next, when its scan is in memory.
-        desk.act(Action::MaskInterrupts { times: 20, from_ns: 98_000, for_ns: 10_000 })?;
-        desk.begin_measuring()?;
-        witness.listen(desk, desk.now_ns() + 100_000_000)?;
-        let ticks = desk.end_measuring()?;
-        Ok((before, ticks, health(desk, witness)?))
+        endpoint.act(Action::MaskInterrupts { times: 20, from_ns: 98_000, for_ns: 10_000 })?;
+        endpoint.begin_measuring()?;
+        witness.listen(endpoint, endpoint.now_ns() + 100_000_000)?;
+        let ticks = endpoint.end_measuring()?;
+        Ok((before, ticks, health(endpoint, witness)?))
     })
     .operator;
     assert!(ticks.start_after_trigger_ns.max > 7_000, "interrupts were not masked: {ticks:?}");
@@ -84,11 +84,11 @@ fn a_torque_reference_that_does_not_arrive_is_a_fault() {
         (State::Torque, Motor::M2, ReferenceWire::Scaled(0.5), Fault::M2TorqueMismatch),
         (State::Torque, Motor::M1, ReferenceWire::Held(2048), Fault::M1TorqueMismatch),
     ] {
-        let outcome = from(state, |desk, witness| {
-            witness.listen(desk, desk.now_ns() + 5_000_000)?;
-            let at = desk.now_ns();
-            desk.act(Action::Reference(motor, wire))?;
-            let health = health(desk, witness)?;
+        let outcome = from(state, |endpoint, witness| {
+            witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+            let at = endpoint.now_ns();
+            endpoint.act(Action::Reference(motor, wire))?;
+            let health = health(endpoint, witness)?;
             Ok((at, health))
         });
         let (at, health) = outcome.operator;
@@ -103,11 +103,11 @@ fn a_torque_reference_that_does_not_arrive_is_a_fault() {
 #[test]
 fn a_scan_cut_short_is_started_anew_and_forgiven() {
     let (before, after, restarts) = {
-        let outcome = from(State::Sliding, |desk, witness| {
-            let before = health(desk, witness)?;
-            desk.act(Action::AdcScanCut)?;
-            witness.listen(desk, desk.now_ns() + 20_000_000)?;
-            Ok((before, health(desk, witness)?))
+        let outcome = from(State::Sliding, |endpoint, witness| {
+            let before = health(endpoint, witness)?;
+            endpoint.act(Action::AdcScanCut)?;
+            witness.listen(endpoint, endpoint.now_ns() + 20_000_000)?;
+            Ok((before, health(endpoint, witness)?))
         });
         (outcome.operator.0, outcome.operator.1, outcome.record.restarts)
     };
@@ -118,11 +118,11 @@ fn a_scan_cut_short_is_started_anew_and_forgiven() {
 
 #[test]
 fn the_serial_streams_do_not_lock_up() {
-    let after = from(State::Armed, |desk, witness| {
-        desk.act(Action::SerialStreamsLockUp)?;
-        witness.listen(desk, desk.now_ns() + 1_000_000_000)?;
-        witness.ask(desk, &Command::Hello)?;
-        health(desk, witness)
+    let after = from(State::Armed, |endpoint, witness| {
+        endpoint.act(Action::SerialStreamsLockUp)?;
+        witness.listen(endpoint, endpoint.now_ns() + 1_000_000_000)?;
+        witness.ask(endpoint, &Command::Hello)?;
+        health(endpoint, witness)
     })
     .operator;
     assert_eq!((after.mode, after.fault), (Mode::Armed.number(), 0));
@@ -130,12 +130,12 @@ fn the_serial_streams_do_not_lock_up() {
 
 #[test]
 fn a_host_that_falls_silent_disarms_the_rig() {
-    let outcome = from(State::Armed, |desk, witness| {
+    let outcome = from(State::Armed, |endpoint, witness| {
         witness.lively = false;
-        let at = desk.now_ns();
-        witness.listen(desk, at + 600_000_000)?;
+        let at = endpoint.now_ns();
+        witness.listen(endpoint, at + 600_000_000)?;
         witness.lively = true;
-        Ok((at, health(desk, witness)?))
+        Ok((at, health(endpoint, witness)?))
     });
     let (at, health) = outcome.operator;
     assert_eq!(Fault::from_number(health.fault), Some(Fault::LinkLost));
@@ -146,21 +146,21 @@ fn a_host_that_falls_silent_disarms_the_rig() {
 #[test]
 fn a_model_is_stored_only_while_the_drives_are_off() {
     for state in [State::Armed, State::Sliding] {
-        let (answer, after) = from(state, |desk, witness| {
-            let answer = witness.ask(desk, &Command::ModelForget)?;
-            Ok((answer, health(desk, witness)?))
+        let (answer, after) = from(state, |endpoint, witness| {
+            let answer = witness.ask(endpoint, &Command::ModelForget)?;
+            Ok((answer, health(endpoint, witness)?))
         })
         .operator;
         assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled), "{state:?}");
         assert_eq!(after.fault, 0, "{state:?}");
     }
-    let answer = from(State::Idle, |desk, witness| witness.ask(desk, &Command::ModelForget)).operator;
+    let answer = from(State::Idle, |endpoint, witness| witness.ask(endpoint, &Command::ModelForget)).operator;
     assert_eq!(answer, Answer::Model(None));
 }
 
 #[test]
 fn a_restart_is_done_only_while_the_drives_are_off() {
-    let answer = from(State::Armed, |desk, witness| witness.ask(desk, &Command::Restart)).operator;
+    let answer = from(State::Armed, |endpoint, witness| witness.ask(endpoint, &Command::Restart)).operator;
     assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled));
 }
 
@@ -168,13 +168,13 @@ fn a_restart_is_done_only_while_the_drives_are_off() {
 // for: that takes 300 rpm, where they are seven counts.
 #[test]
 fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
-    let outcome = from(State::Sliding, |desk, witness| {
+    let outcome = from(State::Sliding, |endpoint, witness| {
         // The tick is due 5 µs into the period: it comes 3 µs later.
-        desk.act(Action::MaskInterrupts { times: 200, from_ns: 3_500, for_ns: 4_500 })?;
-        desk.begin_measuring()?;
-        witness.listen(desk, desk.now_ns() + 200_000_000)?;
-        let ticks = desk.end_measuring()?;
-        Ok((ticks, health(desk, witness)?))
+        endpoint.act(Action::MaskInterrupts { times: 200, from_ns: 3_500, for_ns: 4_500 })?;
+        endpoint.begin_measuring()?;
+        witness.listen(endpoint, endpoint.now_ns() + 200_000_000)?;
+        let ticks = endpoint.end_measuring()?;
+        Ok((ticks, health(endpoint, witness)?))
     });
     let (ticks, health) = outcome.operator;
     assert!(ticks.start_after_trigger_ns.max > 7_500, "the tick was not late: {ticks:?}");
@@ -184,24 +184,24 @@ fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
 #[test]
 fn pulses_coupled_into_the_encoders_lines_do_not_count() {
     for state in [State::Armed, State::Sliding] {
-        let after = from(state, |desk, witness| {
+        let after = from(state, |endpoint, witness| {
             for _ in 0..50 {
-                desk.act(Action::EncoderDisturbed(Motor::M2, 20))?;
-                witness.listen(desk, desk.now_ns() + 1_000_000)?;
+                endpoint.act(Action::EncoderDisturbed(Motor::M2, 20))?;
+                witness.listen(endpoint, endpoint.now_ns() + 1_000_000)?;
             }
-            health(desk, witness)
+            health(endpoint, witness)
         })
         .operator;
         assert_eq!(after.fault, 0, "{state:?}");
     }
     // At rest every count is the disturbance's.
-    let (before, after) = from(State::Armed, |desk, witness| {
-        witness.ask(desk, &Command::Telemetry { every_ticks: 10 })?;
-        witness.listen(desk, desk.now_ns() + 10_000_000)?;
+    let (before, after) = from(State::Armed, |endpoint, witness| {
+        witness.ask(endpoint, &Command::Telemetry { every_ticks: 10 })?;
+        witness.listen(endpoint, endpoint.now_ns() + 10_000_000)?;
         let before = witness.row;
         for _ in 0..50 {
-            desk.act(Action::EncoderDisturbed(Motor::M2, 20))?;
-            witness.listen(desk, desk.now_ns() + 1_000_000)?;
+            endpoint.act(Action::EncoderDisturbed(Motor::M2, 20))?;
+            witness.listen(endpoint, endpoint.now_ns() + 1_000_000)?;
         }
         Ok((before, witness.row))
     })
@@ -230,7 +230,7 @@ fn the_rated_torque_reaches_the_pin() {
 fn the_watchdog_counts_on_while_a_debugger_holds_the_core() {
     // DBGMCU_APB4FZ1 and its bit of the independent watchdog in RM0433.
     const FREEZE: u64 = 0x5C00_1054;
-    let frozen = from(State::Armed, |desk, _| desk.register(FREEZE)).operator;
+    let frozen = from(State::Armed, |endpoint, _| endpoint.register(FREEZE)).operator;
     assert_eq!(frozen >> 18 & 1, 0);
 }
 
@@ -239,7 +239,8 @@ fn the_self_test_of_the_board_passes_with_the_shipped_start() {
     let elf = firmware_build::release_elf_of(firmware_build::SELF_TEST).unwrap();
     let program = Firmware::read(&elf).unwrap();
     let plant = Request::assumed("fig20").unwrap().plant().unwrap();
-    let outcome = bench::run(&program, Box::new(plant), |desk| desk.wait_until(8_000_000_000)).unwrap();
+    let outcome =
+        bench::run(&program, Box::new(plant), |endpoint| endpoint.wait_until(8_000_000_000)).unwrap();
     let log = defmt_log::decode(&program.bytes, &outcome.record.log).unwrap();
     let said = |name: &str| log.lines.iter().find(|line| line.contains(&format!("self-test: {name}")));
     for name in ["clock", "models", "making safe", "loop-back", "ticks"] {

@@ -1,4 +1,4 @@
-//! The operator's desk: where code outside the emulator sits, in step with virtual time.
+//! The co-simulation endpoint: where code outside the emulator works, in step with virtual time.
 //!
 //! The operator is ordinary blocking code on a thread of its own. It and the emulator never run at once: at
 //! the start of each control period the emulator hands over whatever came down the serial line, and goes on
@@ -35,7 +35,7 @@ pub(crate) enum Question {
 
 /// Answers and wake-ups.
 #[derive(Debug)]
-pub(crate) enum ToDesk {
+pub(crate) enum ToEndpoint {
     Woken { now: u64, bytes: Vec<u8> },
     Measured(Box<Ticks>),
     Outputs(DriveInputs),
@@ -49,36 +49,36 @@ pub(crate) enum ToDesk {
 /// The emulator's end.
 #[derive(Debug)]
 pub(crate) struct BenchEnd {
-    pub(crate) from_desk: Receiver<ToBench>,
-    pub(crate) to_desk: Sender<ToDesk>,
+    pub(crate) from_endpoint: Receiver<ToBench>,
+    pub(crate) to_endpoint: Sender<ToEndpoint>,
 }
 
-/// The desk.
+/// The endpoint.
 #[derive(Debug)]
-pub struct Desk {
+pub struct Endpoint {
     to_bench: Sender<ToBench>,
-    from_bench: Receiver<ToDesk>,
+    from_bench: Receiver<ToEndpoint>,
     now: u64,
     received: Vec<u8>,
 }
 
-/// A desk and the emulator's end of it.
-pub(crate) fn desk() -> (Desk, BenchEnd) {
-    let (to_bench, from_desk) = channel();
-    let (to_desk, from_bench) = channel();
-    (Desk { to_bench, from_bench, now: 0, received: Vec::new() }, BenchEnd { from_desk, to_desk })
+/// An endpoint and the emulator's end of it.
+pub(crate) fn endpoint() -> (Endpoint, BenchEnd) {
+    let (to_bench, from_endpoint) = channel();
+    let (to_endpoint, from_bench) = channel();
+    (Endpoint { to_bench, from_bench, now: 0, received: Vec::new() }, BenchEnd { from_endpoint, to_endpoint })
 }
 
 fn over() -> BenchError {
     BenchError::Emulator("the run ended while the operator was still at work".to_owned())
 }
 
-impl Desk {
+impl Endpoint {
     /// Waits for the run to begin.
     ///
     /// # Errors
     /// The run ended.
-    pub(crate) fn sit_down(&mut self) -> Result<(), BenchError> {
+    pub(crate) fn connect(&mut self) -> Result<(), BenchError> {
         self.wait(0)
     }
 
@@ -141,7 +141,7 @@ impl Desk {
     /// The run ended.
     pub fn end_measuring(&mut self) -> Result<Ticks, BenchError> {
         match self.ask(Question::EndMeasuring)? {
-            ToDesk::Measured(ticks) => Ok(*ticks),
+            ToEndpoint::Measured(ticks) => Ok(*ticks),
             _ => Err(over()),
         }
     }
@@ -152,7 +152,7 @@ impl Desk {
     /// The run ended.
     pub fn outputs(&mut self) -> Result<DriveInputs, BenchError> {
         match self.ask(Question::Outputs)? {
-            ToDesk::Outputs(outputs) => Ok(outputs),
+            ToEndpoint::Outputs(outputs) => Ok(outputs),
             _ => Err(over()),
         }
     }
@@ -163,7 +163,7 @@ impl Desk {
     /// The run ended.
     pub fn wrong_pins(&mut self) -> Result<Vec<String>, BenchError> {
         match self.ask(Question::WrongPins)? {
-            ToDesk::WrongPins(wrong) => Ok(wrong),
+            ToEndpoint::WrongPins(wrong) => Ok(wrong),
             _ => Err(over()),
         }
     }
@@ -174,7 +174,7 @@ impl Desk {
     /// The run ended.
     pub fn memory(&mut self, address: u64, length: u64) -> Result<Vec<u8>, BenchError> {
         match self.ask(Question::Memory { address, length })? {
-            ToDesk::Memory(bytes) => Ok(bytes),
+            ToEndpoint::Memory(bytes) => Ok(bytes),
             _ => Err(over()),
         }
     }
@@ -186,7 +186,7 @@ impl Desk {
     /// The run ended.
     pub fn take_log(&mut self) -> Result<Vec<Vec<u8>>, BenchError> {
         match self.ask(Question::TakeLog)? {
-            ToDesk::Log(starts) => Ok(starts),
+            ToEndpoint::Log(starts) => Ok(starts),
             _ => Err(over()),
         }
     }
@@ -197,7 +197,7 @@ impl Desk {
     /// The run ended.
     pub fn register(&mut self, address: u64) -> Result<u64, BenchError> {
         match self.ask(Question::Register(address))? {
-            ToDesk::Register(value) => Ok(value),
+            ToEndpoint::Register(value) => Ok(value),
             _ => Err(over()),
         }
     }
@@ -208,12 +208,12 @@ impl Desk {
     /// The run ended, or the emulator cannot save its state.
     pub fn snapshot(&mut self) -> Result<(), BenchError> {
         match self.ask(Question::Snapshot)? {
-            ToDesk::Done(done) => done.map_err(BenchError::Emulator),
+            ToEndpoint::Done(done) => done.map_err(BenchError::Emulator),
             _ => Err(over()),
         }
     }
 
-    fn ask(&mut self, question: Question) -> Result<ToDesk, BenchError> {
+    fn ask(&mut self, question: Question) -> Result<ToEndpoint, BenchError> {
         self.to_bench.send(ToBench::Ask(question)).map_err(|_| over())?;
         self.from_bench.recv().map_err(|_| over())
     }
@@ -221,7 +221,7 @@ impl Desk {
     fn wait(&mut self, until_ns: u64) -> Result<(), BenchError> {
         self.to_bench.send(ToBench::Wait(until_ns)).map_err(|_| over())?;
         match self.from_bench.recv().map_err(|_| over())? {
-            ToDesk::Woken { now, bytes } => {
+            ToEndpoint::Woken { now, bytes } => {
                 self.now = now;
                 self.received.extend(bytes);
                 Ok(())
