@@ -1,4 +1,4 @@
-//! The core against the plant: what must be seen in Figs. 18–23, three witnesses with sign, identical runs.
+//! The core against the plant: what must be seen in Figs. 18–23, asked, reported and true with their signs, identical runs.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 

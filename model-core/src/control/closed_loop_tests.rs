@@ -99,7 +99,7 @@ fn positive_means_the_same_everywhere() {
         let mut bench = Bench::new().running(&steady(2.0, M2Mode::Speed, sign * 3.0, 2.0));
         let outputs = bench.run(1.0);
         let r = outputs.record;
-        // Three witnesses: what was asked, what the core says, what the rig does.
+        // Three redundant values: what was asked, what the core says, what the rig does.
         assert!(bench.rig.speed_rad_s * sign > 2.9 && f64::from(r.m2_speed_rad_s) * sign > 2.9, "{r:?}");
         assert!(bench.rig.angle_rad * sign > 2.0 && f64::from(r.m2_angle_rad) * sign > 2.0);
         assert!((r.m2_count as f64 / 480_000.0 * TAU - bench.rig.angle_rad).abs() < 0.01);

@@ -1,6 +1,6 @@
 //! Faults of the rig, its wires, its chip: one entry each.
 
-use super::witness::Witness;
+use super::listening_host::ListeningHost;
 use super::{PROMISED_NS, Verdict};
 use crate::bench;
 use crate::defmt_log;
@@ -155,34 +155,34 @@ pub(super) fn all() -> Vec<Case> {
 /// What the operator saw.
 struct Seen {
     at_ns: u64,
-    witness: Witness,
+    listener: ListeningHost,
     hello: Answer,
     kept: Option<KeptMessage>,
 }
 
 fn operate(endpoint: &mut Endpoint, case: &Case) -> Result<Seen, BenchError> {
-    let mut witness = Witness::new();
+    let mut listener = ListeningHost::new();
     // A few periods of company first: the host of before is gone.
-    witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
-    witness.lively = !case.silent;
+    listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+    listener.lively = !case.silent;
     let at_ns = endpoint.now_ns();
     for action in &case.actions {
         endpoint.act(*action)?;
     }
     for (after_ns, action) in &case.later {
-        witness.listen(endpoint, at_ns + after_ns)?;
+        listener.listen(endpoint, at_ns + after_ns)?;
         endpoint.act(*action)?;
     }
-    witness.listen(endpoint, at_ns + case.known_ns + PROMISED_NS + AFTERWARDS_NS)?;
-    witness.lively = true;
-    let hello = witness.ask(endpoint, &Command::Hello)?;
+    listener.listen(endpoint, at_ns + case.known_ns + PROMISED_NS + AFTERWARDS_NS)?;
+    listener.lively = true;
+    let hello = listener.ask(endpoint, &Command::Hello)?;
     // Nobody at the rig, the arm switch still on: nothing may move by itself. A health record comes each 0.1 s.
-    witness.listen(endpoint, endpoint.now_ns() + AFTERWARDS_NS)?;
-    let kept = match witness.ask(endpoint, &Command::KeptMessage)? {
+    listener.listen(endpoint, endpoint.now_ns() + AFTERWARDS_NS)?;
+    let kept = match listener.ask(endpoint, &Command::KeptMessage)? {
         Answer::Kept(kept) => kept,
         _ => None,
     };
-    Ok(Seen { at_ns, witness, hello, kept })
+    Ok(Seen { at_ns, listener, hello, kept })
 }
 
 /// Lets a fault happen, and judges.
@@ -209,7 +209,7 @@ pub(super) fn verdict(
     let safe_ns = record.safe_for_good_from(seen.at_ns).map(|at| at - seen.at_ns);
     let limit = case.known_ns + PROMISED_NS;
     say(safe_ns.is_none_or(|safe| safe > limit), format!("outputs are not safe within {} µs", limit / 1000));
-    let health = seen.witness.health.unwrap_or_default();
+    let health = seen.listener.health.unwrap_or_default();
     let mut said = health.fault;
     let faults: &[Fault] = match &case.told {
         Told::Latched(fault) | Told::Restart(_, Some(fault)) => std::slice::from_ref(fault),
@@ -217,14 +217,14 @@ pub(super) fn verdict(
         Told::Restart(_, None) => &[],
     };
     // What happens while the line is cut is not heard; health tells it later.
-    let told = |fault: &&Fault| seen.witness.heard_of(fault.number()) || case.deaf && said == fault.number();
+    let told = |fault: &&Fault| seen.listener.heard_of(fault.number()) || case.deaf && said == fault.number();
     if let Some(fault) = faults.iter().find(told) {
         said = fault.number();
         let logged = log.lines.iter().any(|line| line.contains("error") && line.contains(fault.sentence()));
         say(!logged, format!("the log does not say: {}", fault.sentence()));
         say(health.fault != fault.number(), format!("its health says {}", words::fault(health.fault)));
     } else if !faults.is_empty() {
-        problems.push(format!("the link tells of none of {faults:?} but of {:?}", seen.witness.events));
+        problems.push(format!("the link tells of none of {faults:?} but of {:?}", seen.listener.events));
     }
     let mut text = if said == 0 { "disabled".to_owned() } else { words::fault(said) };
     if let Told::Restart(cause, _) = case.told {

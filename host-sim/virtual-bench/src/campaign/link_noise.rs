@@ -4,7 +4,7 @@
 //! asked for.
 
 use super::Verdict;
-use super::witness::Witness;
+use super::listening_host::ListeningHost;
 use crate::bench;
 use crate::elf::Firmware;
 use crate::error::BenchError;
@@ -21,22 +21,22 @@ const REQUESTS: u32 = 300;
 
 pub(super) fn verdict(firmware: &Firmware, running: &Saved, scratch: &Path) -> Result<Verdict, BenchError> {
     let outcome = bench::run_on(firmware, running, scratch, |endpoint| {
-        let mut witness = Witness::new();
-        witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+        let mut listener = ListeningHost::new();
+        listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
         endpoint.act(Action::LinkGarbled(DAMAGED_PER_MILLION))?;
         for _ in 0..REQUESTS {
-            witness.send(&Command::SettingGet { key: 143 });
-            witness.listen(endpoint, endpoint.now_ns() + NOISE_NS / u64::from(REQUESTS))?;
+            listener.send(&Command::SettingGet { key: 143 });
+            listener.listen(endpoint, endpoint.now_ns() + NOISE_NS / u64::from(REQUESTS))?;
         }
         endpoint.act(Action::LinkGarbled(0))?;
         // A health record comes each 0.1 s.
-        witness.health = None;
-        witness.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
-        Ok(witness)
+        listener.health = None;
+        listener.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
+        Ok(listener)
     })?;
-    let witness = outcome.operator;
+    let listener = outcome.operator;
     let mut problems = Vec::new();
-    let said = match witness.health {
+    let said = match listener.health {
         Some(health) => {
             if health.mode != Mode::Running.number() {
                 problems.push(format!("the run did not go on: mode {}", health.mode));
@@ -54,7 +54,7 @@ pub(super) fn verdict(firmware: &Firmware, running: &Saved, scratch: &Path) -> R
     let unasked = |kind: &EventKind| {
         matches!(kind, EventKind::Mode { .. } | EventKind::ConfigChanged | EventKind::Refused { .. })
     };
-    for event in witness.events.iter().filter(|event| unasked(&event.kind)) {
+    for event in listener.events.iter().filter(|event| unasked(&event.kind)) {
         problems.push(format!("it did something nobody asked for: {event:?}"));
     }
     if !outcome.record.restarts.is_empty() {

@@ -8,9 +8,9 @@
 
 mod faults;
 mod link_noise;
+pub mod listening_host;
 mod settings_cut;
 pub mod states;
-pub mod witness;
 
 use crate::driver::PERIOD;
 use crate::elf::Firmware;

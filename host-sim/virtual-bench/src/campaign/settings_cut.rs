@@ -6,7 +6,7 @@
 //! another. What a torn word does on the chip beyond this, an ECC error on reading it, is not modelled.
 
 use super::Verdict;
-use super::witness::Witness;
+use super::listening_host::ListeningHost;
 use crate::bench;
 use crate::elf::Firmware;
 use crate::endpoint::Endpoint;
@@ -53,9 +53,9 @@ pub(super) fn verdict(firmware: &Firmware, scratch: &Path) -> Result<Verdict, Be
         // The last ones come after the answer: then it must be the new value.
         let after_ns = stored.took_ns * cut * 5 / (CUTS * 4);
         let seen = bench::run_on(firmware, &idle, scratch, |endpoint| {
-            let mut witness = Witness::new();
-            witness.send(&Command::SettingSet { key: KEY, value: NEW });
-            witness.listen(endpoint, endpoint.now_ns() + after_ns)?;
+            let mut listener = ListeningHost::new();
+            listener.send(&Command::SettingSet { key: KEY, value: NEW });
+            listener.listen(endpoint, endpoint.now_ns() + after_ns)?;
             cut_and_look(endpoint, &[])
         })?;
         judge(format!("supply cut {} µs into the store", after_ns / 1000), seen.operator);
@@ -81,15 +81,15 @@ pub(super) fn verdict(firmware: &Firmware, scratch: &Path) -> Result<Verdict, Be
 fn idle(firmware: &Firmware) -> Result<Saved, BenchError> {
     let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |endpoint| {
         boot(endpoint)?;
-        let mut witness = Witness::new();
-        set(endpoint, &mut witness, FIRST).map_err(BenchError::Rig)?;
+        let mut listener = ListeningHost::new();
+        set(endpoint, &mut listener, FIRST).map_err(BenchError::Rig)?;
         endpoint.snapshot()
     })?;
     outcome.record.saved.ok_or_else(|| BenchError::Emulator("nothing was kept".to_owned()))
 }
 
-fn set(endpoint: &mut Endpoint, witness: &mut Witness, value: f32) -> Result<(), String> {
-    match witness.ask(endpoint, &Command::SettingSet { key: KEY, value }) {
+fn set(endpoint: &mut Endpoint, listener: &mut ListeningHost, value: f32) -> Result<(), String> {
+    match listener.ask(endpoint, &Command::SettingSet { key: KEY, value }) {
         Ok(Answer::Setting(state)) if state.stored.map(f32::to_bits) == Some(value.to_bits()) => Ok(()),
         Ok(other) => Err(format!("it does not store {value}: {other:?}")),
         Err(error) => Err(error.to_string()),
@@ -101,7 +101,7 @@ fn store(endpoint: &mut Endpoint) -> Result<Stored, BenchError> {
     let length = SETTINGS.end - SETTINGS.start;
     let before = endpoint.memory(SETTINGS.start, length)?;
     let started = endpoint.now_ns();
-    set(endpoint, &mut Witness::new(), NEW).map_err(BenchError::Rig)?;
+    set(endpoint, &mut ListeningHost::new(), NEW).map_err(BenchError::Rig)?;
     let took_ns = endpoint.now_ns() - started;
     let after = endpoint.memory(SETTINGS.start, length)?;
     let (before, _) = before.as_chunks::<FLASH_WORD>();
@@ -129,22 +129,22 @@ fn cut_and_look(endpoint: &mut Endpoint, words: &[Action]) -> Result<Result<f32,
     }
     endpoint.act(Action::Power(true))?;
     endpoint.wait_until(endpoint.now_ns() + BOOT_NS)?;
-    let mut witness = Witness::new();
-    match witness.ask(endpoint, &Command::Hello)? {
+    let mut listener = ListeningHost::new();
+    match listener.ask(endpoint, &Command::Hello)? {
         Answer::Hello(hello) if hello.reset == ResetCause::PowerOn => {}
         other => return Ok(Err(format!("it does not say that it was powered on: {other:?}"))),
     }
     // A health record comes each 0.1 s.
-    witness.listen(endpoint, endpoint.now_ns() + 110_000_000)?;
-    match witness.health {
+    listener.listen(endpoint, endpoint.now_ns() + 110_000_000)?;
+    match listener.health {
         Some(health) if health.fault == 0 => {}
         other => return Ok(Err(format!("it is not free of faults: {other:?}"))),
     }
-    let value = match witness.ask(endpoint, &Command::SettingGet { key: KEY })? {
+    let value = match listener.ask(endpoint, &Command::SettingGet { key: KEY })? {
         Answer::Setting(state) if state.stored.map(f32::to_bits) == Some(state.active.to_bits()) => {
             state.active
         }
         other => return Ok(Err(format!("the setting is not as stored: {other:?}"))),
     };
-    Ok(set(endpoint, &mut witness, NEXT).map(|()| value))
+    Ok(set(endpoint, &mut listener, NEXT).map(|()| value))
 }

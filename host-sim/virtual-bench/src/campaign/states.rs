@@ -1,6 +1,6 @@
 //! The rig in each of the states that faults start from, kept: a fault then costs only its own time.
 
-use super::witness::Witness;
+use super::listening_host::ListeningHost;
 use crate::bench;
 use crate::elf::Firmware;
 use crate::endpoint_link::perform;
@@ -76,19 +76,19 @@ impl State {
 fn before_any(firmware: &Firmware, armed: bool) -> Result<Saved, BenchError> {
     let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |endpoint| {
         boot(endpoint)?;
-        let mut witness = Witness::new();
+        let mut listener = ListeningHost::new();
         if armed {
             let mut switch = ArmSwitch::default();
             while !switch.is_on() {
                 switch.turn(endpoint)?;
-                witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+                listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
             }
-            match witness.ask(endpoint, &Command::Arm)? {
+            match listener.ask(endpoint, &Command::Arm)? {
                 Answer::Done => {}
                 other => return Err(BenchError::Rig(format!("it does not arm: {other:?}"))),
             }
         }
-        witness.listen(endpoint, endpoint.now_ns() + 50_000_000)?;
+        listener.listen(endpoint, endpoint.now_ns() + 50_000_000)?;
         endpoint.snapshot()
     })?;
     outcome.record.saved.ok_or_else(nothing)

@@ -7,8 +7,8 @@ use rig_link::message::{Answer, Command, Rejection};
 use rig_link::telemetry::Health;
 use std::sync::OnceLock;
 use virtual_bench::bench::{self, Outcome};
+use virtual_bench::campaign::listening_host::ListeningHost;
 use virtual_bench::campaign::states::State;
-use virtual_bench::campaign::witness::Witness;
 use virtual_bench::defmt_log;
 use virtual_bench::elf::Firmware;
 use virtual_bench::endpoint::Endpoint;
@@ -28,20 +28,20 @@ fn kept(state: State) -> &'static Saved {
 /// Goes on from a state.
 fn from<T: Send>(
     state: State,
-    operator: impl FnOnce(&mut Endpoint, &mut Witness) -> Result<T, BenchError> + Send,
+    operator: impl FnOnce(&mut Endpoint, &mut ListeningHost) -> Result<T, BenchError> + Send,
 ) -> Outcome<T> {
     bench::run_on(firmware(), kept(state), &std::env::temp_dir(), |endpoint| {
-        let mut witness = Witness::new();
-        operator(endpoint, &mut witness)
+        let mut listener = ListeningHost::new();
+        operator(endpoint, &mut listener)
     })
     .unwrap()
 }
 
 /// Waits two health records long, and gives the last.
-fn health(endpoint: &mut Endpoint, witness: &mut Witness) -> Result<Health, BenchError> {
-    witness.health = None;
-    witness.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
-    witness.health.ok_or_else(|| BenchError::Rig("it does not tell its health".to_owned()))
+fn health(endpoint: &mut Endpoint, listener: &mut ListeningHost) -> Result<Health, BenchError> {
+    listener.health = None;
+    listener.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
+    listener.health.ok_or_else(|| BenchError::Rig("it does not tell its health".to_owned()))
 }
 
 #[test]
@@ -57,14 +57,14 @@ fn ticks_come_once_a_period_though_the_write_that_acknowledges_it_is_posted() {
 
 #[test]
 fn interrupts_masked_over_the_end_of_a_period_make_no_tick_more_or_less() {
-    let (before, ticks, after) = from(State::Sliding, |endpoint, witness| {
-        let before = health(endpoint, witness)?;
+    let (before, ticks, after) = from(State::Sliding, |endpoint, listener| {
+        let before = health(endpoint, listener)?;
         // From 2 µs before the end of the period to 8 µs into the next, when its scan is in memory.
         endpoint.act(Action::MaskInterrupts { times: 20, from_ns: 98_000, for_ns: 10_000 })?;
         endpoint.begin_measuring()?;
-        witness.listen(endpoint, endpoint.now_ns() + 100_000_000)?;
+        listener.listen(endpoint, endpoint.now_ns() + 100_000_000)?;
         let ticks = endpoint.end_measuring()?;
-        Ok((before, ticks, health(endpoint, witness)?))
+        Ok((before, ticks, health(endpoint, listener)?))
     })
     .operator;
     assert!(ticks.start_after_trigger_ns.max > 7_000, "interrupts were not masked: {ticks:?}");
@@ -84,11 +84,11 @@ fn a_torque_reference_that_does_not_arrive_is_a_fault() {
         (State::Torque, Motor::M2, ReferenceWire::Scaled(0.5), Fault::M2TorqueMismatch),
         (State::Torque, Motor::M1, ReferenceWire::Held(2048), Fault::M1TorqueMismatch),
     ] {
-        let outcome = from(state, |endpoint, witness| {
-            witness.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+        let outcome = from(state, |endpoint, listener| {
+            listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
             let at = endpoint.now_ns();
             endpoint.act(Action::Reference(motor, wire))?;
-            let health = health(endpoint, witness)?;
+            let health = health(endpoint, listener)?;
             Ok((at, health))
         });
         let (at, health) = outcome.operator;
@@ -103,11 +103,11 @@ fn a_torque_reference_that_does_not_arrive_is_a_fault() {
 #[test]
 fn a_scan_cut_short_is_started_anew_and_forgiven() {
     let (before, after, restarts) = {
-        let outcome = from(State::Sliding, |endpoint, witness| {
-            let before = health(endpoint, witness)?;
+        let outcome = from(State::Sliding, |endpoint, listener| {
+            let before = health(endpoint, listener)?;
             endpoint.act(Action::AdcScanCut)?;
-            witness.listen(endpoint, endpoint.now_ns() + 20_000_000)?;
-            Ok((before, health(endpoint, witness)?))
+            listener.listen(endpoint, endpoint.now_ns() + 20_000_000)?;
+            Ok((before, health(endpoint, listener)?))
         });
         (outcome.operator.0, outcome.operator.1, outcome.record.restarts)
     };
@@ -118,11 +118,11 @@ fn a_scan_cut_short_is_started_anew_and_forgiven() {
 
 #[test]
 fn the_serial_streams_do_not_lock_up() {
-    let after = from(State::Armed, |endpoint, witness| {
+    let after = from(State::Armed, |endpoint, listener| {
         endpoint.act(Action::SerialStreamsLockUp)?;
-        witness.listen(endpoint, endpoint.now_ns() + 1_000_000_000)?;
-        witness.ask(endpoint, &Command::Hello)?;
-        health(endpoint, witness)
+        listener.listen(endpoint, endpoint.now_ns() + 1_000_000_000)?;
+        listener.ask(endpoint, &Command::Hello)?;
+        health(endpoint, listener)
     })
     .operator;
     assert_eq!((after.mode, after.fault), (Mode::Armed.number(), 0));
@@ -130,12 +130,12 @@ fn the_serial_streams_do_not_lock_up() {
 
 #[test]
 fn a_host_that_falls_silent_disarms_the_rig() {
-    let outcome = from(State::Armed, |endpoint, witness| {
-        witness.lively = false;
+    let outcome = from(State::Armed, |endpoint, listener| {
+        listener.lively = false;
         let at = endpoint.now_ns();
-        witness.listen(endpoint, at + 600_000_000)?;
-        witness.lively = true;
-        Ok((at, health(endpoint, witness)?))
+        listener.listen(endpoint, at + 600_000_000)?;
+        listener.lively = true;
+        Ok((at, health(endpoint, listener)?))
     });
     let (at, health) = outcome.operator;
     assert_eq!(Fault::from_number(health.fault), Some(Fault::LinkLost));
@@ -146,21 +146,22 @@ fn a_host_that_falls_silent_disarms_the_rig() {
 #[test]
 fn a_model_is_stored_only_while_the_drives_are_off() {
     for state in [State::Armed, State::Sliding] {
-        let (answer, after) = from(state, |endpoint, witness| {
-            let answer = witness.ask(endpoint, &Command::ModelForget)?;
-            Ok((answer, health(endpoint, witness)?))
+        let (answer, after) = from(state, |endpoint, listener| {
+            let answer = listener.ask(endpoint, &Command::ModelForget)?;
+            Ok((answer, health(endpoint, listener)?))
         })
         .operator;
         assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled), "{state:?}");
         assert_eq!(after.fault, 0, "{state:?}");
     }
-    let answer = from(State::Idle, |endpoint, witness| witness.ask(endpoint, &Command::ModelForget)).operator;
+    let answer =
+        from(State::Idle, |endpoint, listener| listener.ask(endpoint, &Command::ModelForget)).operator;
     assert_eq!(answer, Answer::Model(None));
 }
 
 #[test]
 fn a_restart_is_done_only_while_the_drives_are_off() {
-    let answer = from(State::Armed, |endpoint, witness| witness.ask(endpoint, &Command::Restart)).operator;
+    let answer = from(State::Armed, |endpoint, listener| listener.ask(endpoint, &Command::Restart)).operator;
     assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled));
 }
 
@@ -168,13 +169,13 @@ fn a_restart_is_done_only_while_the_drives_are_off() {
 // for: that takes 300 rpm, where they are seven counts.
 #[test]
 fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
-    let outcome = from(State::Sliding, |endpoint, witness| {
+    let outcome = from(State::Sliding, |endpoint, listener| {
         // The tick is due 5 µs into the period: it comes 3 µs later.
         endpoint.act(Action::MaskInterrupts { times: 200, from_ns: 3_500, for_ns: 4_500 })?;
         endpoint.begin_measuring()?;
-        witness.listen(endpoint, endpoint.now_ns() + 200_000_000)?;
+        listener.listen(endpoint, endpoint.now_ns() + 200_000_000)?;
         let ticks = endpoint.end_measuring()?;
-        Ok((ticks, health(endpoint, witness)?))
+        Ok((ticks, health(endpoint, listener)?))
     });
     let (ticks, health) = outcome.operator;
     assert!(ticks.start_after_trigger_ns.max > 7_500, "the tick was not late: {ticks:?}");
@@ -184,26 +185,26 @@ fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
 #[test]
 fn pulses_coupled_into_the_encoders_lines_do_not_count() {
     for state in [State::Armed, State::Sliding] {
-        let after = from(state, |endpoint, witness| {
+        let after = from(state, |endpoint, listener| {
             for _ in 0..50 {
                 endpoint.act(Action::EncoderDisturbed(Motor::M2, 20))?;
-                witness.listen(endpoint, endpoint.now_ns() + 1_000_000)?;
+                listener.listen(endpoint, endpoint.now_ns() + 1_000_000)?;
             }
-            health(endpoint, witness)
+            health(endpoint, listener)
         })
         .operator;
         assert_eq!(after.fault, 0, "{state:?}");
     }
     // At rest every count is the disturbance's.
-    let (before, after) = from(State::Armed, |endpoint, witness| {
-        witness.ask(endpoint, &Command::Telemetry { every_ticks: 10 })?;
-        witness.listen(endpoint, endpoint.now_ns() + 10_000_000)?;
-        let before = witness.row;
+    let (before, after) = from(State::Armed, |endpoint, listener| {
+        listener.ask(endpoint, &Command::Telemetry { every_ticks: 10 })?;
+        listener.listen(endpoint, endpoint.now_ns() + 10_000_000)?;
+        let before = listener.row;
         for _ in 0..50 {
             endpoint.act(Action::EncoderDisturbed(Motor::M2, 20))?;
-            witness.listen(endpoint, endpoint.now_ns() + 1_000_000)?;
+            listener.listen(endpoint, endpoint.now_ns() + 1_000_000)?;
         }
-        Ok((before, witness.row))
+        Ok((before, listener.row))
     })
     .operator;
     let (before, after) = (before.unwrap(), after.unwrap());

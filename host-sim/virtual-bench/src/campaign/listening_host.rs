@@ -13,7 +13,7 @@ const PATIENCE_NS: u64 = 1_000_000_000;
 
 /// The host.
 #[derive(Debug)]
-pub struct Witness {
+pub struct ListeningHost {
     client: Client,
     alive_at: u64,
     /// Sends signs of life.
@@ -27,13 +27,13 @@ pub struct Witness {
     answers: Vec<(u16, Answer)>,
 }
 
-impl Default for Witness {
+impl Default for ListeningHost {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Witness {
+impl ListeningHost {
     /// A host that has heard nothing, and sends signs of life.
     #[must_use]
     pub fn new() -> Self {
