@@ -17,10 +17,10 @@ fn rig(arguments: &[&str], folder: &Path) -> Output {
 #[ignore = "driven with the measured speed, bristles leave 0.33 % on figs. 18-21: the diagnosis does not name the block there yet"]
 fn the_case_study_names_the_block_that_lugre_lacks() {
     let made = demo(|_, _, _| ()).unwrap();
-    assert_eq!(made.story.diagnosis.verdict, "named", "{}", made.story.diagnosis.sentence);
-    let causes: Vec<&str> = made.story.diagnosis.causes.iter().map(|cause| cause.id.as_str()).collect();
+    assert_eq!(made.case_study.diagnosis.verdict, "named", "{}", made.case_study.diagnosis.sentence);
+    let causes: Vec<&str> = made.case_study.diagnosis.causes.iter().map(|cause| cause.id.as_str()).collect();
     assert_eq!(causes, ["element_compliance"]);
-    assert!(made.story.diagnosis.extended.gain.unwrap() > 0.4, "{}", made.story.found());
+    assert!(made.case_study.diagnosis.extended.gain.unwrap() > 0.4, "{}", made.case_study.found());
 }
 
 #[test]

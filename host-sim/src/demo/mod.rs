@@ -10,11 +10,11 @@ mod comparison;
 pub mod figure;
 mod findings;
 mod runs;
-pub mod story;
+pub mod case_study;
 
 pub use comparison::Comparison;
 pub use runs::{ClosedLoop, Runs};
-pub use story::Story;
+pub use case_study::CaseStudy;
 
 use crate::input_error::InputError;
 use crate::report::{Block, Page, Table};
@@ -25,7 +25,7 @@ pub struct Demo {
     /// The runs.
     pub runs: Runs,
     /// The hidden effect.
-    pub story: Story,
+    pub case_study: CaseStudy,
     /// The page.
     pub page: Page,
     /// The short table for the terminal.
@@ -38,15 +38,15 @@ pub struct Demo {
 /// What a run refuses.
 pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputError> {
     let runs = Runs::new(&mut progress)?;
-    let story = Story::new(&runs)?;
+    let case_study = CaseStudy::new(&runs)?;
     progress(runs::STEPS, runs::STEPS, "report");
-    let page = page(&runs, &story, axes::table(&runs)?);
+    let page = page(&runs, &case_study, axes::table(&runs)?);
     let mut table = terminal_table(&runs);
-    table.push_str(&format!("{:<8} {:<53} {}\n", "hidden", "what LuGre lacks in figs. 18–21", story.found()));
-    Ok(Demo { runs, story, page, table })
+    table.push_str(&format!("{:<8} {:<53} {}\n", "hidden", "what LuGre lacks in figs. 18–21", case_study.found()));
+    Ok(Demo { runs, case_study, page, table })
 }
 
-fn page(runs: &Runs, story: &Story, axes: Table) -> Page {
+fn page(runs: &Runs, case_study: &CaseStudy, axes: Table) -> Page {
     let mut blocks = vec![
         Block::Heading("The experiments".into()),
         Block::Text(findings::experiments_sentence(runs)),
@@ -63,7 +63,7 @@ fn page(runs: &Runs, story: &Story, axes: Table) -> Page {
     blocks.push(Block::Heading("Across the contact patch, and over speed".into()));
     blocks.push(Block::Chart(runs.crossing.chart()));
     blocks.push(Block::Chart(runs.sweep.chart()));
-    blocks.extend(story.blocks.iter().cloned());
+    blocks.extend(case_study.blocks.iter().cloned());
     blocks.push(Block::Heading("What the paper says, and what was found".into()));
     blocks.push(Block::Table(findings::statements(runs)));
     blocks.push(Block::Heading("On the paper's own axes, and with other assumed numbers".into()));

@@ -131,10 +131,10 @@ proptest! {
     ) {
         let mut bench = Bench::new();
         let mut permission = Permission::default();
-        // So that more than refusals is seen, half of the story is told at the begin.
+        // So that more than refusals is seen, half of the happenings come at the begin.
         let begin = [Happening::Ticks(1100), Happening::Switch(true), Happening::Ticks(60), Happening::Command(8)];
-        let story: Vec<Happening> = begin.into_iter().chain(happenings).collect();
-        for happening in story {
+        let course: Vec<Happening> = begin.into_iter().chain(happenings).collect();
+        for happening in course {
             let (how, ticks) = match happening {
                 Happening::Switch(on) => {
                     bench.arm_switch = on;

@@ -23,14 +23,14 @@ const HELD_OUT: &str = "fig19";
 
 /// What the diagnosis found.
 #[derive(Debug, Clone)]
-pub struct Story {
+pub struct CaseStudy {
     /// The diagnosis, as in `diagnosis.json`.
     pub diagnosis: Diagnosis,
     /// Its page, for this one.
     pub blocks: Vec<Block>,
 }
 
-impl Story {
+impl CaseStudy {
     /// Diagnoses the runs of Figs. 18–21.
     ///
     /// # Errors
