@@ -38,14 +38,14 @@ fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_
 
     for c in &made.runs.comparisons {
         for candidate in &c.candidates {
-            let (name, o) = (candidate.contender.name, candidate);
-            match candidate.contender.role {
+            let (name, o) = (candidate.model.name, candidate);
+            match candidate.model.role {
                 Role::Series => assert!(o.constant_overshoot > 0.1 && o.closed_overshoot > 0.1, "{name}"),
                 Role::Brush => assert!(o.constant_overshoot > 0.1, "{name}"),
                 _ => assert!(o.constant_overshoot.abs() < 1e-4, "{name}: {}", o.constant_overshoot),
             }
             // Driven by the rig's own motion the series element must give the rig's own friction.
-            if candidate.contender.role == Role::Series {
+            if candidate.model.role == Role::Series {
                 let error: f64 = o.open_nm.iter().zip(&o.closed_nm).map(|(a, b)| (a - b) * (a - b)).sum();
                 let power: f64 = o.closed_nm.iter().map(|b| b * b).sum();
                 let nrmse = (error / power).sqrt();

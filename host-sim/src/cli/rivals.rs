@@ -13,7 +13,7 @@ use crate::input_error::InputError;
 use crate::plant::ElementParameters;
 use crate::report::{Block, Page, Table};
 use crate::studies::bristle_damping::{self, Damped};
-use crate::studies::contenders::rubber_of;
+use crate::studies::candidate_models::rubber_of;
 use crate::studies::readings::{self, Row, SPEEDS_RPM};
 use crate::studies::rivals::{Candidate, Plan, Tournament, all, play};
 

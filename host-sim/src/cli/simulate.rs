@@ -19,7 +19,7 @@ use crate::lockstep::Setup;
 use crate::plant::{ElementParameters, PERIOD_S, left_out};
 use crate::provenance;
 use crate::report::{Block, Chart, Page};
-use crate::studies::contenders::rubber_of;
+use crate::studies::candidate_models::rubber_of;
 use crate::studies::{patch_crossing, speed_sweep};
 use crate::summary::{RunFacts, Summary};
 

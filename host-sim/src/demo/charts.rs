@@ -160,8 +160,8 @@ pub(super) fn comparison(c: &Comparison) -> Chart {
         c.candidates
             .iter()
             .map(|k| Line {
-                name: k.contender.name.into(),
-                role: k.contender.role,
+                name: k.model.name.into(),
+                role: k.model.role,
                 x: c.time_s.clone(),
                 y: pick(k),
                 tolerance: 0.01,

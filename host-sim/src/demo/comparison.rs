@@ -7,14 +7,14 @@ use crate::input_error::InputError;
 use crate::lockstep::Setup;
 use crate::plant::PERIOD_S;
 use crate::report::Role;
-use crate::studies::contenders::{Contender, constant_overshoot, drive, five};
+use crate::studies::candidate_models::{CandidateModel, constant_overshoot, drive, five};
 use model_core::friction::series::SeriesParameters;
 
 /// One model in one experiment.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// The model.
-    pub contender: Contender,
+    pub model: CandidateModel,
     /// True friction torque with this model on the disc, in closed loop.
     pub closed_nm: Vec<f64>,
     /// Friction torque of the model driven by the motion of the rig with the series element.
@@ -76,22 +76,22 @@ impl Comparison {
             })
             .collect();
         let mut candidates = Vec::new();
-        for contender in five(rubber, sliding_speed_m_s, load)? {
-            let closed_nm = if contender.role == Role::Series {
+        for model in five(rubber, sliding_speed_m_s, load)? {
+            let closed_nm = if model.role == Role::Series {
                 real.recording.column(|f| f.truth.friction_torque_nm)
             } else {
                 let mut setup = setup.clone();
-                setup.plant.elements = contender.parameters;
+                setup.plant.elements = model.parameters;
                 let run = ClosedLoop::run(experiment, &setup, |_, _| {})?;
                 run.recording.column(|f| f.truth.friction_torque_nm)
             };
-            let force = drive(&contender.parameters.model(PERIOD_S)?, motion.iter().copied());
+            let force = drive(&model.parameters.model(PERIOD_S)?, motion.iter().copied());
             let open_nm: Vec<f64> = force.into_iter().map(|f| f * radius_m).collect();
             candidates.push(Candidate {
                 closed_overshoot: overshoot(&closed_nm),
                 open_overshoot: overshoot(&open_nm),
-                constant_overshoot: constant_overshoot(&contender.parameters, sliding_speed_m_s, load)?,
-                contender,
+                constant_overshoot: constant_overshoot(&model.parameters, sliding_speed_m_s, load)?,
+                model,
                 closed_nm,
                 open_nm,
             });
@@ -108,7 +108,7 @@ impl Comparison {
     /// The candidate of a role.
     #[must_use]
     pub fn of(&self, role: Role) -> Option<&Candidate> {
-        self.candidates.iter().find(|c| c.contender.role == role)
+        self.candidates.iter().find(|c| c.model.role == role)
     }
 }
 

@@ -119,7 +119,7 @@ pub(super) fn constant_sentence(runs: &Runs) -> String {
         return "not run".into();
     };
     let each = c.candidates.iter().map(|k| {
-        let name = k.contender.name.split(',').next().unwrap_or(k.contender.name);
+        let name = k.model.name.split(',').next().unwrap_or(k.model.name);
         format!("{name} {}", percent(k.constant_overshoot))
     });
     each.collect::<Vec<_>>().join(", ")
@@ -141,7 +141,7 @@ pub(super) fn models(runs: &Runs) -> Vec<Block> {
             .map(|(k, m)| {
                 let each =
                     runs.comparisons.iter().map(|c| percent(c.candidates[k].constant_overshoot)).collect();
-                [vec![m.contender.name.into()], each, vec![m.contender.why.into()]].concat()
+                [vec![m.model.name.into()], each, vec![m.model.why.into()]].concat()
             })
             .collect(),
     };
@@ -153,7 +153,7 @@ pub(super) fn models(runs: &Runs) -> Vec<Block> {
                     let m = &c.candidates[k];
                     format!("{} / {}", percent(m.closed_overshoot), percent(m.open_overshoot))
                 };
-                [vec![m.contender.name.into()], runs.comparisons.iter().map(pair).collect()].concat()
+                [vec![m.model.name.into()], runs.comparisons.iter().map(pair).collect()].concat()
             })
             .collect(),
     };

@@ -5,16 +5,16 @@
 //! written down beforehand but the explanations.
 
 mod axes;
+pub mod case_study;
 mod charts;
 mod comparison;
 pub mod figure;
 mod findings;
 mod runs;
-pub mod case_study;
 
+pub use case_study::CaseStudy;
 pub use comparison::Comparison;
 pub use runs::{ClosedLoop, Runs};
-pub use case_study::CaseStudy;
 
 use crate::input_error::InputError;
 use crate::report::{Block, Page, Table};
@@ -42,7 +42,12 @@ pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputE
     progress(runs::STEPS, runs::STEPS, "report");
     let page = page(&runs, &case_study, axes::table(&runs)?);
     let mut table = terminal_table(&runs);
-    table.push_str(&format!("{:<8} {:<53} {}\n", "hidden", "what LuGre lacks in figs. 18–21", case_study.found()));
+    table.push_str(&format!(
+        "{:<8} {:<53} {}\n",
+        "hidden",
+        "what LuGre lacks in figs. 18–21",
+        case_study.found()
+    ));
     Ok(Demo { runs, case_study, page, table })
 }
 

@@ -9,7 +9,7 @@ use crate::input_error::InputError;
 use crate::lockstep::{self, Recording, Setup};
 use crate::plant::ElementParameters;
 use crate::report::{Block, Page};
-use crate::studies::contenders::rubber_of;
+use crate::studies::candidate_models::rubber_of;
 use crate::studies::patch_crossing::{self, Crossing};
 use crate::studies::speed_sweep::{self, Sweep};
 use crate::summary::{RunFacts, Summary, summarise};

@@ -10,7 +10,7 @@ use model_core::friction::lugre::LugreParameters;
 use model_core::friction::series::SeriesParameters;
 use model_core::friction::stribeck::Stribeck;
 
-use super::contenders::constant_overshoot;
+use super::candidate_models::constant_overshoot;
 use super::readings::SPEEDS_RPM;
 use crate::demo::ClosedLoop;
 use crate::files::experiment_file::ExperimentFile;

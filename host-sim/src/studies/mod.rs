@@ -1,7 +1,7 @@
 //! Studies that need no motors, and the models that are compared.
 
 pub mod bristle_damping;
-pub mod contenders;
+pub mod candidate_models;
 pub mod patch_crossing;
 pub mod readings;
 pub mod rivals;

@@ -4,7 +4,7 @@
 //! at the sliding speed. The patches (eqs. 7, 15, 19) are run until they are steady and give u(s) point by
 //! point; the series element is followed along its way, t = s/(rω), which for a steady patch is the same.
 
-use super::contenders::five;
+use super::candidate_models::five;
 use crate::files::experiment_file::PatchCrossing;
 use crate::files::log::Log;
 use crate::plant::ElementParameters;

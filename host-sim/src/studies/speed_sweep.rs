@@ -4,7 +4,7 @@
 //! mean and the span of the last half are given. The bell is Savkoor's, with assumed numbers: the paper prints
 //! the shape and no scale.
 
-use super::contenders::{drive, five};
+use super::candidate_models::{drive, five};
 use crate::files::experiment_file::SpeedSweep;
 use crate::files::log::Log;
 use crate::report::{Chart, Line, Panel, Role};
@@ -137,7 +137,7 @@ impl Sweep {
 
 #[cfg(test)]
 mod tests {
-    use super::super::contenders::rubber_of;
+    use super::super::candidate_models::rubber_of;
     use super::*;
     use crate::plant::ElementParameters;
 

@@ -17,7 +17,7 @@ use model_core::friction::{Contact, FrictionParameters};
 
 /// One of the five.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Contender {
+pub struct CandidateModel {
     /// Name with its equations.
     pub name: &'static str,
     /// Its colour in charts.
@@ -42,12 +42,12 @@ pub fn five(
     rubber: &SeriesParameters<f64>,
     sliding_speed_m_s: f64,
     normal_force_n: f64,
-) -> Result<[Contender; 5], ParameterError> {
+) -> Result<[CandidateModel; 5], ParameterError> {
     let curve = Stribeck::new(&rubber.bristles.stribeck)?;
     let bristles = LugreParameters { sigma0_n_per_m: rubber.k_u_n_per_m, ..rubber.bristles };
     let element = ElementParameters::Elements;
     Ok([
-        Contender {
+        CandidateModel {
             name: "brush, eqs. 4–6",
             role: Role::Brush,
             why: "It drops from µ_s to µ_c at once when it breaks loose. The size of the drop is put in by hand, and \
@@ -58,14 +58,14 @@ pub fn five(
                 mu_c: curve.coefficient(sliding_speed_m_s),
             })),
         },
-        Contender {
+        CandidateModel {
             name: "LuGre, eqs. 12–14",
             role: Role::Lugre,
             why: "It cannot: at constant speed g(v) is one number, and the deflection rises monotonically to \
                   F_N g(v)/σ0. Its force could with σ1 v > F_N g(v); here σ1 = 0.",
             parameters: element(FrictionParameters::lugre(&bristles)),
         },
-        Contender {
+        CandidateModel {
             name: "LuGre patch, eqs. 15–16",
             role: Role::LugrePatch,
             why: "It cannot, for the same reason. As printed it drops F_N from the deflection, so its force follows the \
@@ -78,14 +78,14 @@ pub fn five(
                 largest_transport_speed_m_s: 0.0,
             }),
         },
-        Contender {
+        CandidateModel {
             name: "modified LuGre, eqs. 17–19",
             role: Role::ModifiedLugre,
             why: "It cannot: the equation for the asperities' speed s has exactly one root, so u̇ depends on u alone, \
                   and u rises monotonically (a0 > a1 δ e^{−(1 + 1/δ)}, σ1 = 0). A rate that lags gives an overshoot.",
             parameters: element(FrictionParameters::modified_lugre(&bristles)),
         },
-        Contender {
+        CandidateModel {
             name: "series element, Fig. 25",
             role: Role::Series,
             why: "It does: while the block winds up, the asperities slide slower than the root, so they feel a larger \
