@@ -64,7 +64,7 @@ impl Diagnose {
             |paths: &[PathBuf]| paths.iter().map(|path| Log::read(path)).collect::<Result<Vec<_>, _>>();
         let (train, holdout) = (read(&self.train)?, read(&self.holdout)?);
         let mut output = OutputDir::new(&self.out)?;
-        // Drive, press, the contact's singles, pairs, triples, evidence, table, held out, extended model.
+        // Drive, normal load, the contact's singles, pairs, triples, evidence, table, held out, extended model.
         let progress = Mutex::new(Progress::new("looking at", 9));
         let told = |what: &str| {
             let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);

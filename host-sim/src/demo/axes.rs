@@ -132,7 +132,7 @@ fn channel_row(runs: &Runs) -> Vec<String> {
     )
 }
 
-/// Whether friction peaks after the normal force has settled, over the assumed mode of the press.
+/// Whether friction peaks after the normal force has settled, over the assumed mode of the normal-load actuator.
 fn press_mode_row() -> Result<Vec<String>, InputError> {
     let mut each = Vec::new();
     let mut all = true;

@@ -1,7 +1,7 @@
 //! Effects of the contact that a model file adds to the elements: heat, wear, dwell, a film …
 //!
 //! The core's laws around the core's friction model, for all three elements together: an effect of the whole
-//! surface does not differ from element to element. Effects of sensors, press and drive are not the plant's; a
+//! surface does not differ from element to element. Effects of sensors, normal-load actuator and drive are not the plant's; a
 //! caller that is given some should say so ([`crate::predict::effects_elsewhere`] and [`left_out`]).
 
 use model_core::error::ParameterError;

@@ -1,4 +1,4 @@
-//! The rig behind the control core, in `f64`: drives, press, disc, rubber elements, sensors.
+//! The rig behind the control core, in `f64`: drives, normal-load actuator, disc, rubber elements, sensors.
 //!
 //! One [`Plant::step`] covers one control period. The linear parts (drive lags, normal force, torque ring and
 //! amplifiers) are discretised exactly once. Disc and elements are coupled by a velocity Verlet step: half a
@@ -24,8 +24,8 @@ mod from_files;
 mod hands;
 mod linear;
 mod noise;
+mod normal_load;
 pub mod parameters;
-mod press;
 mod step;
 
 pub use analogue::PinVoltages;
@@ -207,7 +207,7 @@ impl Plant {
             &Quantities {
                 friction_nm: self.calm.bridges[0].output(&s.bridges[0]),
                 normal_n: self.calm.bridges[1].output(&s.bridges[1]),
-                m1_torque_nm: s.press.torque_nm(),
+                m1_torque_nm: s.normal_load.torque_nm(),
                 m2_torque_nm: s.m2_torque_nm,
             },
             &mut self.noise,
@@ -221,15 +221,15 @@ impl Plant {
     pub fn truth(&self) -> Truth {
         let s = &self.state;
         Truth {
-            m1_torque_nm: s.press.torque_nm(),
-            m1_angle_rad: self.calm.press.angle_rad(&s.press),
+            m1_torque_nm: s.normal_load.torque_nm(),
+            m1_angle_rad: self.calm.normal_load.angle_rad(&s.normal_load),
             m2_torque_nm: s.m2_torque_nm,
             m2_angle_rad: s.disc.motor_angle_rad,
             m2_speed_rad_s: s.disc.motor_speed_rad_s,
             disc_angle_rad: s.disc.angle_rad,
             disc_speed_rad_s: s.disc.speed_rad_s,
             sliding_speed_m_s: s.sliding_speed_m_s,
-            normal_force_n: s.press.normal_force_n(),
+            normal_force_n: s.normal_load.normal_force_n(),
             friction_torque_nm: s.friction_torque_nm,
             bearing_torque_nm: self.disc.bearing().torque_and_slope(s.disc.speed_rad_s).0,
             deformation_m: s.elements.deformation_m(),
@@ -248,7 +248,10 @@ impl Plant {
     fn positions(&self) -> [(f64, f64); 2] {
         let s = &self.state;
         [
-            (self.calm.press.angle_rad(&s.press), self.calm.press.speed_rad_s(&s.press)),
+            (
+                self.calm.normal_load.angle_rad(&s.normal_load),
+                self.calm.normal_load.speed_rad_s(&s.normal_load),
+            ),
             (s.disc.motor_angle_rad, s.disc.motor_speed_rad_s),
         ]
     }

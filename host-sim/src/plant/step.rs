@@ -1,6 +1,6 @@
 //! One sub-step of the plant, and when a control period needs many of them.
 //!
-//! Order: press and M2's torque (exact), half a kick of the disc, elements at the speed of the middle, half a
+//! Order: normal load and M2's torque (exact), half a kick of the disc, elements at the speed of the middle, half a
 //! kick, bridges.
 //!
 //! The element's own step is of first order in the normal force it is given and in the instant at which it breaks
@@ -14,15 +14,15 @@ use super::bridge::{Bridge, BridgeState};
 use super::disc::{Disc, DiscState};
 use super::elements::{Elements, ElementsState};
 use super::hands::Hands;
+use super::normal_load::{NormalLoad, NormalLoadState};
 use super::parameters::PlantParameters;
-use super::press::{Press, PressState};
 use model_core::error::ParameterError;
 use model_core::real::Real;
 
 /// Everything that changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct State {
-    pub(super) press: PressState,
+    pub(super) normal_load: NormalLoadState,
     pub(super) m2_torque_nm: f64,
     pub(super) disc: DiscState,
     pub(super) elements: ElementsState,
@@ -36,7 +36,7 @@ pub(super) struct State {
 pub(super) struct Grid {
     pub(super) substeps: u32,
     pub(super) step_s: f64,
-    pub(super) press: Press,
+    pub(super) normal_load: NormalLoad,
     /// Decay of M2's torque over half a sub-step.
     m2_half_decay: f64,
     m2_lag_s: f64,
@@ -50,7 +50,7 @@ impl Grid {
         Ok(Self {
             substeps,
             step_s,
-            press: Press::new(p, step_s),
+            normal_load: NormalLoad::new(p, step_s),
             m2_half_decay: Real::exp(-0.5 * step_s / p.m2.lag_s()),
             m2_lag_s: p.m2.lag_s(),
             elements: Elements::new(&p.elements, p.load_shares, step_s)?.with_effects(
@@ -66,7 +66,7 @@ impl Grid {
     /// At rest, with the elements lifted off.
     pub(super) fn rest(&self) -> State {
         State {
-            press: self.press.rest(),
+            normal_load: self.normal_load.rest(),
             m2_torque_nm: 0.0,
             disc: DiscState::default(),
             elements: self.elements.rest(),
@@ -86,8 +86,8 @@ impl Grid {
         (hands, hand_on_disc_nm): (&Hands, f64),
     ) {
         let h = self.step_s;
-        self.press.step(&mut s.press, m1_nm, hands.m1_nm);
-        let normal_force_n = s.press.normal_force_n();
+        self.normal_load.step(&mut s.normal_load, m1_nm, hands.m1_nm);
+        let normal_force_n = s.normal_load.normal_force_n();
         // ∫ τ dt of a lag: u dt + T (τ − τ⁺).
         let mut impulse = || {
             let next = m2_nm + (s.m2_torque_nm - m2_nm) * self.m2_half_decay;
@@ -121,7 +121,7 @@ impl Activity {
     #[inline]
     pub(super) fn is_busy(&mut self, s: &State, commands_nm: [f64; 2]) -> bool {
         let now = Self {
-            normal_force_n: s.press.normal_force_n(),
+            normal_force_n: s.normal_load.normal_force_n(),
             tip_speed_m_s: s.elements.tip_speed_m_s,
             commands_nm,
         };

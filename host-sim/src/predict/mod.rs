@@ -3,7 +3,7 @@
 //! | signal | predicted from | by |
 //! |---|---|---|
 //! | friction torque | measured speed and normal force | the friction model, then the rig's friction bridge |
-//! | normal force | measured torque of M1 | lever, foil springs, mode of the press, then the normal bridge |
+//! | normal force | measured torque of M1 | lever, foil springs, mode of the normal-load actuator, then the normal bridge |
 //! | torque of M2 | measured speed and friction torque | inertia and bearing, means over 10 ms |
 //!
 //! The residual is measured minus predicted; nrmse = RMS(residual)/RMS(measured).

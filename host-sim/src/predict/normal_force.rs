@@ -1,7 +1,7 @@
 //! Normal force from the torque of M1.
 //!
 //! ẍ + 2ζω ẋ + ω² x = ω² (G τ1 − F0),  F_N = max(0, x), then the normal bridge; G is the lever's gain,
-//! F0 the foil springs' preload. The press is taken to be settled at the first sample.
+//! F0 the foil springs' preload. The normal-load actuator is taken to be settled at the first sample.
 //! Left out: friction of the lever, hardening of the springs, ripple of M1.
 
 use super::Comparison;
@@ -18,12 +18,12 @@ pub fn predict_normal_force(
 ) -> Comparison {
     let pressed = |torque_nm: f64| rig.lever_gain_n_per_nm * torque_nm - rig.preload_n;
     let start_n = m1_torque_nm.first().map_or(0.0, |torque_nm| pressed(*torque_nm));
-    let mut press = SecondOrder::new(rig.pressure.mode_hz, rig.pressure.damping_ratio, start_n);
+    let mut actuator = SecondOrder::new(rig.pressure.mode_hz, rig.pressure.damping_ratio, start_n);
     let mut bridge = BridgeModel::new(&rig.normal_bridge, start_n.max(0.0));
     let mut predicted = vec![start_n.max(0.0)];
     for (times, torque_nm) in time_s.windows(2).zip(m1_torque_nm.iter().skip(1)) {
         let step_s = times[1] - times[0];
-        predicted.push(bridge.step(step_s, press.step(step_s, pressed(*torque_nm)).max(0.0)));
+        predicted.push(bridge.step(step_s, actuator.step(step_s, pressed(*torque_nm)).max(0.0)));
     }
     predicted.truncate(time_s.len());
     Comparison { measured: normal_force_n.to_vec(), predicted }

@@ -12,9 +12,9 @@
 use super::linear::Held;
 use super::parameters::PlantParameters;
 
-/// The press, prepared for a step size.
+/// The normal-load actuator, prepared for a step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Press {
+pub(crate) struct NormalLoad {
     system: Held<3, 2>,
     preload_n: f64,
     gain_n_per_nm: f64,
@@ -23,9 +23,9 @@ pub(crate) struct Press {
 
 /// Torque of M1, force x and its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressState([f64; 3]);
+pub(crate) struct NormalLoadState([f64; 3]);
 
-impl Press {
+impl NormalLoad {
     pub(crate) fn new(p: &PlantParameters, step_s: f64) -> Self {
         let rate = 1.0 / p.m1.lag_s();
         let w = std::f64::consts::TAU * p.pressure.mode_hz;
@@ -45,27 +45,27 @@ impl Press {
     }
 
     /// At rest without torque: the springs hold the elements off.
-    pub(crate) fn rest(&self) -> PressState {
-        PressState([0.0, -self.preload_n, 0.0])
+    pub(crate) fn rest(&self) -> NormalLoadState {
+        NormalLoadState([0.0, -self.preload_n, 0.0])
     }
 
     #[inline]
-    pub(crate) fn step(&self, state: &mut PressState, command_nm: f64, hand_nm: f64) {
+    pub(crate) fn step(&self, state: &mut NormalLoadState, command_nm: f64, hand_nm: f64) {
         // A hand on the shaft works on the mechanism at once, without the drive's lag.
         let held_up_n = self.preload_n - self.gain_n_per_nm * hand_nm;
         state.0 = self.system.step(&state.0, &[command_nm, held_up_n]);
     }
 
-    pub(crate) fn angle_rad(&self, state: &PressState) -> f64 {
+    pub(crate) fn angle_rad(&self, state: &NormalLoadState) -> f64 {
         (state.0[1] + self.preload_n) * self.radian_per_newton
     }
 
-    pub(crate) fn speed_rad_s(&self, state: &PressState) -> f64 {
+    pub(crate) fn speed_rad_s(&self, state: &NormalLoadState) -> f64 {
         state.0[2] * self.radian_per_newton
     }
 }
 
-impl PressState {
+impl NormalLoadState {
     pub(crate) fn torque_nm(&self) -> f64 {
         self.0[0]
     }
