@@ -70,7 +70,7 @@ pub fn reset_cause() -> ResetCause {
     cause
 }
 
-/// What the control core is told about the start.
+/// What the control core learns about the start.
 #[must_use]
 pub fn restart_kind(cause: ResetCause, kept: Option<&KeptMessage>) -> Restart {
     match (kept.map(|message| message.kind), cause) {

@@ -25,9 +25,12 @@ fn the_case_study_names_the_block_that_lugre_lacks() {
 
 #[test]
 fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_byte() {
-    let mut told = Vec::new();
-    let made = demo(|done, total, what| told.push((done, total, what.to_string()))).unwrap();
-    assert!(told.windows(2).all(|w| w[1].0 > w[0].0) && told.last().unwrap().0 == told[0].1, "{told:?}");
+    let mut progress = Vec::new();
+    let made = demo(|done, total, what| progress.push((done, total, what.to_string()))).unwrap();
+    assert!(
+        progress.windows(2).all(|w| w[1].0 > w[0].0) && progress.last().unwrap().0 == progress[0].1,
+        "{progress:?}"
+    );
 
     let figure = figure::overshoot_svg(&made.runs).unwrap();
     let committed = include_str!("../figures/overshoot.svg");

@@ -172,7 +172,7 @@ fn progress_is_told_up_to_the_end() {
         &set(&[("m2.1.start_s", "1.0"), ("m1.1.start_s", "1.5"), ("duration_s", "2.0")]),
     )
     .unwrap();
-    let mut told = Vec::new();
-    run(&setup(&experiment), |done, total| told.push((done, total))).unwrap();
-    assert_eq!(told, [(5_000, 20_000), (10_000, 20_000), (15_000, 20_000), (20_000, 20_000)]);
+    let mut progress = Vec::new();
+    run(&setup(&experiment), |done, total| progress.push((done, total))).unwrap();
+    assert_eq!(progress, [(5_000, 20_000), (10_000, 20_000), (15_000, 20_000), (20_000, 20_000)]);
 }

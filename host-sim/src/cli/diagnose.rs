@@ -65,16 +65,16 @@ impl Diagnose {
         let (train, holdout) = (read(&self.train)?, read(&self.holdout)?);
         let mut output = OutputDir::new(&self.out)?;
         // Drive, normal load, the contact's singles, pairs, triples, evidence, table, held out, extended model.
-        let progress = Mutex::new(Progress::new("looking at", 9));
-        let told = |what: &str| {
-            let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
-            progress.say(&format!("looking at: {what}"));
-            progress.advance(1);
+        let bar = Mutex::new(Progress::new("looking at", 9));
+        let progress = |what: &str| {
+            let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
+            bar.say(&format!("looking at: {what}"));
+            bar.advance(1);
         };
         let wall_s = || started.elapsed().as_secs_f64();
         let Written { diagnosis, model, page, .. } =
-            diagnose(&train, &holdout, &rig, &model, &wall_s, &told)?;
-        drop(progress);
+            diagnose(&train, &holdout, &rig, &model, &wall_s, &progress)?;
+        drop(bar);
         output.write_json("diagnosis.json", &diagnosis)?;
         output.write("model-extended.toml", model)?;
         output.write("report.html", page.to_html())?;

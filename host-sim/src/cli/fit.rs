@@ -198,14 +198,14 @@ impl Fit {
             free.retain(|free| free != name);
         }
         // Five starts of at most five rounds, then some ten to converge.
-        let progress = Mutex::new(Progress::new("fitting", 35));
+        let bar = Mutex::new(Progress::new("fitting", 35));
         let rounds = AtomicU64::new(0);
-        let told = || {
+        let progress = || {
             rounds.fetch_add(1, Ordering::Relaxed);
-            progress.lock().unwrap_or_else(PoisonError::into_inner).advance(1);
+            bar.lock().unwrap_or_else(PoisonError::into_inner).advance(1);
         };
-        let fit = fit_contact::identify(&model, &rig, logs, &free, &told)?;
-        drop(progress);
+        let fit = fit_contact::identify(&model, &rig, logs, &free, &progress)?;
+        drop(bar);
         write_contact(output, &fit, logs, &rig, rounds.into_inner())
     }
 

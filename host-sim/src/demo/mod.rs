@@ -32,7 +32,7 @@ pub struct Demo {
     pub table: String,
 }
 
-/// Runs everything. `progress` is told the steps done of all and what is done next.
+/// Runs everything. `progress` gets the steps done of all and what is done next.
 ///
 /// # Errors
 /// What a run refuses.

@@ -93,7 +93,7 @@ impl Proposal {
     }
 }
 
-/// All experiments that were tried, best first. `progress` is told the number done of all.
+/// All experiments that were tried, best first. `progress` gets the number done of all.
 ///
 /// # Errors
 /// A model that cannot be simulated, or a rig on which no experiment runs without a fault.

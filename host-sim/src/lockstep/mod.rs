@@ -24,7 +24,7 @@ use model_core::control::{Command, ControlConfig, Mode, Samples};
 
 /// Ticks that arming may take before something is wrong.
 const MOST_ARMING_TICKS: u32 = 50_000;
-/// How often progress is told.
+/// How often progress is reported.
 const PROGRESS_TICKS: usize = 5_000;
 
 /// What is run.
@@ -155,7 +155,7 @@ impl Lockstep {
     }
 }
 
-/// Runs an experiment to its end, or to the fault that ends it. `progress` is told the ticks done of all.
+/// Runs an experiment to its end, or to the fault that ends it. `progress` gets the ticks done of all.
 ///
 /// # Errors
 /// A plant parameter out of range, an experiment beyond the limits of the core, or a core that does not arm.

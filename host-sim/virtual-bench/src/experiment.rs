@@ -216,7 +216,7 @@ impl Done {
     }
 }
 
-/// Runs an experiment; `progress` is told the ticks done of all.
+/// Runs an experiment; `progress` gets the ticks done of all.
 ///
 /// # Errors
 /// Whatever kept it from its end. A fault of the rig ends it early and is no error: see [`Done::complaints`].

@@ -18,7 +18,7 @@ pub struct Restart {
 pub struct Record {
     /// The log's bytes, one entry for each start of the firmware.
     pub log: Vec<Vec<u8>>,
-    /// Every change of what the drives are told, with its instant in ns.
+    /// Every change of what the drives are asked for, with its instant in ns.
     pub outputs: Vec<(u64, DriveInputs)>,
     /// Restarts.
     pub restarts: Vec<Restart>,

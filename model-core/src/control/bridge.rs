@@ -96,7 +96,7 @@ impl Bridge {
             (state.filtered, state.primed) = (value, true);
         }
         let suspect = self.failure_of(code);
-        // Open, short and saturated take turns while a wire breaks: any of them counts on, the last one is told.
+        // Open, short and saturated take turns while a wire breaks: any of them counts on, the last one is reported.
         state.suspect_ticks = if suspect.is_some() { state.suspect_ticks.saturating_add(1) } else { 0 };
         let lasting = suspect.is_some() && state.suspect_ticks >= self.persistence_ticks;
         BridgeReading { value, filtered: state.filtered, failure: if lasting { suspect } else { None } }

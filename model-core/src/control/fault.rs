@@ -6,7 +6,7 @@
 use super::numbered::{numbered, numbered_set};
 
 numbered! {
-    /// A reason to make safe. Lower numbers are told first when several come in one tick.
+    /// A reason to make safe. Lower numbers are reported first when several come in one tick.
     pub enum Fault {
         EmergencyStop = 1, "The emergency stop is pressed or its circuit is open.";
         M1DriveFault = 2, "The drive of M1 reports a fault.";

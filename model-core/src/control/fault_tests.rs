@@ -111,14 +111,14 @@ fn ticks_to_fault(bench: &mut Bench, case: Case) -> usize {
             continue;
         }
         assert!(r.faults.contains(case.fault), "{:?} and not {:?}", case.fault, r.fault);
-        assert_eq!(r.fault, Some(case.fault), "the first to be told");
+        assert_eq!(r.fault, Some(case.fault), "the first to be reported");
         assert!(outputs.is_safe(), "{:?}: not safe in the same tick", case.fault);
         assert_eq!((r.mode, r.m1_torque_ref_nm, r.m2_torque_ref_nm), (Mode::Fault, 0.0, 0.0));
         assert!(outputs.leds.fault && !outputs.leds.live && !outputs.leds.ready);
-        let told = |kind| bench.events.iter().any(|e| e.kind == kind && e.tick == r.tick);
-        assert!(told(EventKind::FaultLatched(case.fault)));
+        let reported = |kind| bench.events.iter().any(|e| e.kind == kind && e.tick == r.tick);
+        assert!(reported(EventKind::FaultLatched(case.fault)));
         let reason = Reason::FaultLatched;
-        assert!(told(EventKind::ModeChanged { from: Mode::Running, to: Mode::Fault, reason }));
+        assert!(reported(EventKind::ModeChanged { from: Mode::Running, to: Mode::Fault, reason }));
         return n;
     }
     panic!("{:?} did not come within {} ticks", case.fault, case.within_ticks);

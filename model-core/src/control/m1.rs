@@ -19,7 +19,7 @@ pub(crate) struct M1 {
     force_limit_nm: f32,
 }
 
-/// What a motor is told in one tick.
+/// What a motor is asked for in one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct MotorCommand {
     /// For the record.

@@ -154,8 +154,8 @@ fn commands_that_do_not_fit_the_mode_are_refused_with_their_reason() {
     seen.sort_by_key(|reason| reason.number());
     seen.dedup();
     assert_eq!(seen, Refusal::ALL, "every refusal was seen");
-    let told = bench.events.iter().filter(|e| matches!(e.kind, EventKind::CommandRefused(_))).count();
-    assert_eq!(told, 17, "and every one told in the events");
+    let reported = bench.events.iter().filter(|e| matches!(e.kind, EventKind::CommandRefused(_))).count();
+    assert_eq!(reported, 17, "and every one reported in the events");
 }
 
 #[test]
@@ -174,11 +174,11 @@ fn a_tare_makes_the_bridges_read_zero_and_tells_the_codes() {
     bench.apply(Command::Tare).unwrap();
     let r = bench.run(0.6).record;
     assert!(r.friction_torque_nm.abs() < 1e-6 && r.normal_force_n.abs() < 1e-6, "{r:?}");
-    let told = bench.events.iter().any(|e| {
+    let reported = bench.events.iter().any(|e| {
         matches!(e.kind, EventKind::TareDone { friction_zero_code, normal_zero_code }
             if friction_zero_code == 33268.0 && normal_zero_code == 6161.0)
     });
-    assert!(told, "{:?}", bench.events);
+    assert!(reported, "{:?}", bench.events);
 }
 
 #[test]
@@ -189,11 +189,11 @@ fn a_tare_under_load_is_refused_and_changes_nothing() {
     bench.apply(Command::Tare).unwrap();
     let r = bench.run(0.6).record;
     assert!((r.normal_force_n - 29.3).abs() < 0.05, "{r:?}");
-    let told = bench
+    let reported = bench
         .events
         .iter()
         .any(|e| matches!(e.kind, EventKind::TareRefused { normal_n, .. } if normal_n > 29.0));
-    assert!(told, "{:?}", bench.events);
+    assert!(reported, "{:?}", bench.events);
 }
 
 #[test]
@@ -248,12 +248,16 @@ fn limits_are_told_once_a_run_and_shown_in_every_tick() {
     let r = bench.run(0.9).record;
     assert!(r.limits.contains(Limit::NormalForce) && r.limits.contains(Limit::SpeedReference), "{r:?}");
     assert!((r.m1_torque_ref_nm - 3.6).abs() < 1e-5 && (r.m2_speed_ref_rad_s - 10.0).abs() < 1e-5);
-    let told = |limit| bench.events.iter().filter(|e| e.kind == EventKind::LimitReached(limit)).count();
-    assert_eq!((told(Limit::NormalForce), told(Limit::SpeedReference)), (1, 1));
+    let reported = |limit| bench.events.iter().filter(|e| e.kind == EventKind::LimitReached(limit)).count();
+    assert_eq!((reported(Limit::NormalForce), reported(Limit::SpeedReference)), (1, 1));
     bench.apply(Command::Stop).unwrap();
     bench.run(1.0);
     bench.apply(Command::Start).unwrap();
     bench.run(0.5);
-    let told = |limit| bench.events.iter().filter(|e| e.kind == EventKind::LimitReached(limit)).count();
-    assert_eq!((told(Limit::NormalForce), told(Limit::SpeedReference)), (2, 2), "again in the next run");
+    let reported = |limit| bench.events.iter().filter(|e| e.kind == EventKind::LimitReached(limit)).count();
+    assert_eq!(
+        (reported(Limit::NormalForce), reported(Limit::SpeedReference)),
+        (2, 2),
+        "again in the next run"
+    );
 }

@@ -46,7 +46,7 @@ pub struct ControlState {
     supervisor: Supervisor,
     sequencer: Sequencer,
     events: EventQueue,
-    limits_told: LimitSet,
+    limits_reported: LimitSet,
     guard: GuardState,
     inputs: InputState,
     measuring: MeasuringState,
@@ -171,7 +171,7 @@ impl ControlState {
             supervisor: Supervisor::new(restart, settings_intact),
             sequencer: Sequencer::default(),
             events: EventQueue::default(),
-            limits_told: LimitSet::EMPTY,
+            limits_reported: LimitSet::EMPTY,
             guard: GuardState::default(),
             inputs: InputState::new(config.timing.permission_ticks),
             measuring: MeasuringState::new(config),
@@ -241,7 +241,7 @@ impl ControlState {
         self.events.push(self.tick, kind);
     }
 
-    /// What the motors are told in this tick, and the limits that act.
+    /// What the motors are asked for in this tick, and the limits that act.
     fn step_loops(&mut self, config: &ControlConfig, m: &Measured) -> ([MotorCommand; 2], LimitSet) {
         let demand = match self.mode() {
             Mode::Running => self.sequencer.step().unwrap_or_else(|| {
@@ -267,10 +267,10 @@ impl ControlState {
             faults.insert(Fault::CalculationInvalid);
             self.supervisor.latch(faults, self.tick, &mut self.events);
         }
-        for limit in limits.without(self.limits_told).iter() {
+        for limit in limits.without(self.limits_reported).iter() {
             self.events.push(self.tick, EventKind::LimitReached(limit));
         }
-        self.limits_told = self.limits_told.union(limits);
+        self.limits_reported = self.limits_reported.union(limits);
         ([m1, m2], limits)
     }
 
@@ -360,7 +360,7 @@ fn carry_out(
             let ready = state.sequencer.state() != SequencerState::Empty;
             supervisor.start(ready, tick, events)?;
             state.sequencer.start();
-            state.limits_told = LimitSet::EMPTY;
+            state.limits_reported = LimitSet::EMPTY;
         }
         Command::Stop => {
             supervisor.stop(tick, events)?;
@@ -430,8 +430,8 @@ pub fn step(config: &ControlConfig, state: &mut ControlState, samples: &Samples)
     }
     let dac = [config.m1_dac.code(commands[0].command_nm), config.m2_dac.code(commands[1].command_nm)];
     let [m1, m2] = &mut state.torque_watch;
-    m1.told(config.m1_dac.torque_nm(dac[0]));
-    m2.told(config.m2_dac.torque_nm(dac[1]));
+    m1.commanded(config.m1_dac.torque_nm(dac[0]));
+    m2.commanded(config.m2_dac.torque_nm(dac[1]));
     let record = state.record(config, &m, &commands, limits, &observed);
     let outputs = Outputs { dac, drive_enable: [mode.is_live(); 2], leds: state.leds(), record };
     state.tick = state.tick.wrapping_add(1);

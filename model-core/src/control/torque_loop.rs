@@ -37,7 +37,7 @@ pub(crate) struct TorqueState {
 pub(crate) struct TorqueCommand {
     /// Reference after limit and slew.
     pub(crate) reference_nm: f32,
-    /// What the drive is told.
+    /// What the drive is asked for.
     pub(crate) command_nm: f32,
     pub(crate) saturated: bool,
     pub(crate) slewing: bool,

@@ -1,6 +1,6 @@
 //! The torque a drive is asked for against the torque its monitor shows.
 //!
-//! What the DAC was told passes one control period and the drive's lag τ, as in `torque_loop.rs`: that is the torque to
+//! What the DAC was given passes one control period and the drive's lag τ, as in `torque_loop.rs`: that is the torque to
 //! expect, τ̂. A broken reference wire, a drive that ignores its reference, takes it with another gain or with the
 //! other sign shows as |τ̂ − τ| beyond what offsets and gain errors explain,
 //!
@@ -36,7 +36,7 @@ pub(crate) struct TorqueWatch {
 /// What the watch over one drive remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TorqueWatchState {
-    told_nm: f32,
+    commanded_nm: f32,
     delayed_nm: f32,
     expected_nm: f32,
     excess_nm_ticks: f32,
@@ -57,7 +57,7 @@ impl TorqueWatch {
     #[inline(always)]
     pub(crate) fn step(&self, state: &mut TorqueWatchState, measured_nm: f32) -> bool {
         state.expected_nm += self.lag_per_tick * (state.delayed_nm - state.expected_nm);
-        state.delayed_nm = state.told_nm;
+        state.delayed_nm = state.commanded_nm;
         let bound_nm = self.offset_nm + self.gain * libm::fabsf(state.expected_nm);
         let sum = state.excess_nm_ticks + (libm::fabsf(state.expected_nm - measured_nm) - bound_nm);
         // What is no number counts for nothing here; the checks of the levels and of the commands find it.
@@ -67,9 +67,9 @@ impl TorqueWatch {
 }
 
 impl TorqueWatchState {
-    /// What the drive was told in this tick.
-    pub(crate) fn told(&mut self, torque_nm: f32) {
-        self.told_nm = torque_nm;
+    /// What the drive was asked for in this tick.
+    pub(crate) fn commanded(&mut self, torque_nm: f32) {
+        self.commanded_nm = torque_nm;
     }
 }
 
@@ -99,7 +99,7 @@ mod tests {
             let mismatch = watch.step(&mut state, torque as f32);
             torque = keep * torque + (1.0 - keep) * wire(*tick, acting);
             acting = command(*tick);
-            state.told(acting as f32);
+            state.commanded(acting as f32);
             mismatch
         })
     }

@@ -28,9 +28,9 @@ const SHORT_MICROVOLT: u32 = 1_000;
 /// Time to watch after the outputs became safe, and after a restart.
 const AFTERWARDS_NS: u64 = 300_000_000;
 
-/// How a fault is told.
+/// What is expected to be reported.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Told {
+enum Expected {
     /// The supervisor latches it and says so.
     Latched(Fault),
     /// One of these: which one comes first depends on the phase of the motion.
@@ -47,15 +47,23 @@ pub(super) struct Case {
     /// Done so long after the fault, e.g. the supply coming back.
     later: Vec<(u64, Action)>,
     known_ns: u64,
-    told: Told,
+    expected: Expected,
     /// The host goes silent with the fault.
     silent: bool,
     /// And hears nothing.
     deaf: bool,
 }
 
-fn case(name: &'static str, actions: &[Action], known_ns: u64, told: Told) -> Case {
-    Case { name, actions: actions.to_vec(), later: Vec::new(), known_ns, told, silent: false, deaf: false }
+fn case(name: &'static str, actions: &[Action], known_ns: u64, expected: Expected) -> Case {
+    Case {
+        name,
+        actions: actions.to_vec(),
+        later: Vec::new(),
+        known_ns,
+        expected,
+        silent: false,
+        deaf: false,
+    }
 }
 
 /// The faults, and after what time each can be known by the settings the firmware has.
@@ -68,22 +76,22 @@ pub(super) fn all() -> Vec<Case> {
     let held = |index: usize, microvolt: u32| [Action::AnalogueInput(index, Some(microvolt))];
     let stop = Action::EmergencyStop(true);
     let mut all = vec![
-        case("emergency stop pressed", &[stop], 0, Told::Latched(Fault::EmergencyStop)),
+        case("emergency stop pressed", &[stop], 0, Expected::Latched(Fault::EmergencyStop)),
         Case {
             later: vec![(5_000_000, Action::EmergencyStop(false))],
-            ..case("emergency stop tapped for 5 ms", &[stop], 0, Told::Latched(Fault::EmergencyStop))
+            ..case("emergency stop tapped for 5 ms", &[stop], 0, Expected::Latched(Fault::EmergencyStop))
         },
         case(
             "M1 drive fault",
             &[Action::DriveHealthy(Motor::M1, false)],
             0,
-            Told::Latched(Fault::M1DriveFault),
+            Expected::Latched(Fault::M1DriveFault),
         ),
         case(
             "M2 drive fault",
             &[Action::DriveHealthy(Motor::M2, false)],
             0,
-            Told::Latched(Fault::M2DriveFault),
+            Expected::Latched(Fault::M2DriveFault),
         ),
     ];
     for (line, level, name) in [
@@ -93,8 +101,8 @@ pub(super) fn all() -> Vec<Case> {
         (Line::B, true, "M2 encoder line B stuck high"),
     ] {
         // At speed a dead line is a jump of the speed, seen in the first whole period without counts.
-        let told = Told::OneOf(&[Fault::M2EncoderJump, Fault::M2EncoderNoTorque]);
-        all.push(case(name, &[Action::EncoderLine(Motor::M2, line, Some(level))], PERIOD, told));
+        let expected = Expected::OneOf(&[Fault::M2EncoderJump, Fault::M2EncoderNoTorque]);
+        all.push(case(name, &[Action::EncoderLine(Motor::M2, line, Some(level))], PERIOD, expected));
     }
     for (index, microvolt, name, fault) in [
         (0, CLIPPED_MICROVOLT, "friction bridge saturated", Fault::FrictionBridgeSaturated),
@@ -102,52 +110,62 @@ pub(super) fn all() -> Vec<Case> {
         (0, SHORT_MICROVOLT, "friction bridge shorted", Fault::FrictionBridgeShort),
         (1, OPEN_MICROVOLT, "normal-force bridge open", Fault::NormalBridgeOpen),
     ] {
-        all.push(case(name, &held(index, microvolt), bridge, Told::Latched(fault)));
+        all.push(case(name, &held(index, microvolt), bridge, Expected::Latched(fault)));
     }
     // A normal force near the bridge's end is an over-force too, and both need two samples.
-    let clipped = Told::OneOf(&[Fault::NormalBridgeSaturated, Fault::OverForce]);
+    let clipped = Expected::OneOf(&[Fault::NormalBridgeSaturated, Fault::OverForce]);
     all.push(case("normal-force bridge saturated", &held(1, CLIPPED_MICROVOLT), bridge, clipped));
     let supply_low = seconds(settings.supply.persistence_s);
-    all.push(case("supply down to 18 V", &held(4, 1_636_000), supply_low, Told::Latched(Fault::SupplyLow)));
+    all.push(case(
+        "supply down to 18 V",
+        &held(4, 1_636_000),
+        supply_low,
+        Expected::Latched(Fault::SupplyLow),
+    ));
     // A scan that does not come is missed at the end of its period.
     let stalled = ticks(settings.timing.adc_stall_ticks);
     all.push(case(
         "ADC starts no more scans",
         &[Action::AdcStalled(true)],
         stalled,
-        Told::Latched(Fault::AdcStalled),
+        Expected::Latched(Fault::AdcStalled),
     ));
     let silence = seconds(settings.timing.link_timeout_s);
-    all.push(Case { silent: true, ..case("host silent", &[], silence, Told::Latched(Fault::LinkLost)) });
+    all.push(Case { silent: true, ..case("host silent", &[], silence, Expected::Latched(Fault::LinkLost)) });
     all.push(Case {
         silent: true,
         deaf: true,
-        // The line is whole again so that the reason can be told.
+        // The line is whole again so that the reason can be reported.
         later: vec![(silence + 100_000_000, Action::LinkSilent(false))],
-        ..case("serial line cut", &[Action::LinkSilent(true)], silence, Told::Latched(Fault::LinkLost))
+        ..case("serial line cut", &[Action::LinkSilent(true)], silence, Expected::Latched(Fault::LinkLost))
     });
     all.push(case(
         "control tick hangs",
         &[Action::HangTick],
         WATCHDOG_NS,
-        Told::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
+        Expected::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
     ));
     all.push(case(
         "control tick traps",
         &[Action::TrapTick],
         0,
-        Told::Restart(ResetCause::Software, Some(Fault::HardFault)),
+        Expected::Restart(ResetCause::Software, Some(Fault::HardFault)),
     ));
     all.push(case(
         "threads hang, the tick goes on",
         &[Action::HangThreads],
         THREADS_NS + WATCHDOG_NS,
-        Told::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
+        Expected::Restart(ResetCause::Watchdog, Some(Fault::WatchdogReset)),
     ));
-    all.push(case("reset pin pulled", &[Action::ResetPin], 0, Told::Restart(ResetCause::Pin, None)));
+    all.push(case("reset pin pulled", &[Action::ResetPin], 0, Expected::Restart(ResetCause::Pin, None)));
     all.push(Case {
         later: vec![(50_000_000, Action::Power(true))],
-        ..case("power cut for 50 ms", &[Action::Power(false)], 0, Told::Restart(ResetCause::PowerOn, None))
+        ..case(
+            "power cut for 50 ms",
+            &[Action::Power(false)],
+            0,
+            Expected::Restart(ResetCause::PowerOn, None),
+        )
     });
     all
 }
@@ -211,14 +229,15 @@ pub(super) fn verdict(
     say(safe_ns.is_none_or(|safe| safe > limit), format!("outputs are not safe within {} µs", limit / 1000));
     let health = seen.listener.health.unwrap_or_default();
     let mut said = health.fault;
-    let faults: &[Fault] = match &case.told {
-        Told::Latched(fault) | Told::Restart(_, Some(fault)) => std::slice::from_ref(fault),
-        Told::OneOf(faults) => faults,
-        Told::Restart(_, None) => &[],
+    let faults: &[Fault] = match &case.expected {
+        Expected::Latched(fault) | Expected::Restart(_, Some(fault)) => std::slice::from_ref(fault),
+        Expected::OneOf(faults) => faults,
+        Expected::Restart(_, None) => &[],
     };
     // What happens while the line is cut is not heard; health tells it later.
-    let told = |fault: &&Fault| seen.listener.heard_of(fault.number()) || case.deaf && said == fault.number();
-    if let Some(fault) = faults.iter().find(told) {
+    let reported =
+        |fault: &&Fault| seen.listener.heard_of(fault.number()) || case.deaf && said == fault.number();
+    if let Some(fault) = faults.iter().find(reported) {
         said = fault.number();
         let logged = log.lines.iter().any(|line| line.contains("error") && line.contains(fault.sentence()));
         say(!logged, format!("the log does not say: {}", fault.sentence()));
@@ -227,7 +246,7 @@ pub(super) fn verdict(
         problems.push(format!("the link tells of none of {faults:?} but of {:?}", seen.listener.events));
     }
     let mut text = if said == 0 { "disabled".to_owned() } else { words::fault(said) };
-    if let Told::Restart(cause, _) = case.told {
+    if let Expected::Restart(cause, _) = case.expected {
         match &seen.hello {
             Answer::Hello(hello) if hello.reset == cause => {
                 text = format!("started by {cause:?}; {text}");
@@ -242,7 +261,7 @@ pub(super) fn verdict(
         problems.push(format!("it restarted: {:?}", record.restarts));
     }
     // Only a trap leaves a message, which is in the log and over the link.
-    let trapped = matches!(case.told, Told::Restart(_, Some(Fault::HardFault)));
+    let trapped = matches!(case.expected, Expected::Restart(_, Some(Fault::HardFault)));
     match &seen.kept {
         Some(kept) if trapped && kept.text.starts_with("pc ") => {
             if !log.lines.iter().any(|line| line.contains(kept.text.as_str())) {

@@ -18,7 +18,7 @@ pub struct ListeningHost {
     alive_at: u64,
     /// Sends signs of life.
     pub lively: bool,
-    /// What happened, as the rig told it.
+    /// What happened, as the rig reported it.
     pub events: Vec<EventMessage>,
     /// The last health record.
     pub health: Option<Health>,
@@ -99,7 +99,7 @@ impl ListeningHost {
         Err(BenchError::Rig(format!("no answer to {command:?}")))
     }
 
-    /// Whether the rig told of this fault.
+    /// Whether the rig reported this fault.
     #[must_use]
     pub fn heard_of(&self, fault: u8) -> bool {
         self.events.iter().any(|event| event.kind == EventKind::FaultLatched(fault))

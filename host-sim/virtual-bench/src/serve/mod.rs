@@ -112,7 +112,7 @@ struct Service<'a> {
     outside: Switches,
     /// When a willing person turns the arm switch on again.
     arm_on_at: Option<u64>,
-    lost_told: u64,
+    lost_reported: u64,
 }
 
 /// How the person left what can be touched.
@@ -143,7 +143,7 @@ impl<'a> Service<'a> {
             pace: Pace::new(served.speed, Duration::ZERO, now_ns),
             outside: Switches::default(),
             arm_on_at: None,
-            lost_told: 0,
+            lost_reported: 0,
         }
     }
 
@@ -302,8 +302,8 @@ impl<'a> Service<'a> {
             eprintln!("virtual-bench: {}", behind.sentence());
         }
         let lost = self.pty.lost_bytes();
-        if lost > self.lost_told + (1 << 20) || (lost > 0 && self.lost_told == 0) {
-            self.lost_told = lost;
+        if lost > self.lost_reported + (1 << 20) || (lost > 0 && self.lost_reported == 0) {
+            self.lost_reported = lost;
             eprintln!("virtual-bench: the host does not read: {lost} bytes lost so far");
         }
     }

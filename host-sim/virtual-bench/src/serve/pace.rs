@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hiccup_is_caught_up_and_more_is_let_go_and_told() {
+    fn a_hiccup_is_caught_up_and_more_is_let_go_and_reported() {
         let mut pace = Pace::new(Speed::Times(1.0), Duration::ZERO, 0);
         // 40 ms late: no sleep until it is made good.
         assert_eq!(pace.sleep(50 * MS, 10_000_000), Duration::ZERO);

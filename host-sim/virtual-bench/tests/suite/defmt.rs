@@ -1,6 +1,6 @@
 //! The firmware's log has every change of state, and nothing of it is dropped.
 //!
-//! Three witnesses beside the log: the mode in every telemetry row, the events over the link, the drive enables at the
+//! Three redundant sources beside the log: the mode in every telemetry row, the events over the link, the drive enables at the
 //! pins.
 
 use super::runs::{FIGURES, run};
@@ -58,7 +58,7 @@ fn a_log_without_one_of_its_changes_is_contradicted() {
     }
 }
 
-/// What the other witnesses say against these changes.
+/// What the other sources say against these changes.
 fn contradictions(done: &Done, changes: &[Change]) -> Vec<String> {
     let mut found = Vec::new();
     if changes.first().map(|change| change.from) != Some(Mode::Boot) {
@@ -73,20 +73,21 @@ fn contradictions(done: &Done, changes: &[Change]) -> Vec<String> {
     let other = done.run.rows.iter().find(|row| row.mode != mode_at(changes, row.tick).number());
     found.extend(other.map(|row| format!("telemetry shows mode {} at tick {}", row.mode, row.tick)));
 
-    let mut told = 0;
+    let mut reported = 0;
     for event in &done.run.events {
         if let EventKind::Mode { from, to, .. } = event.kind {
-            told += 1;
+            reported += 1;
             let same = |change: &Change| {
                 (change.tick, change.from.number(), change.to.number()) == (event.tick, from, to)
             };
             if !changes.iter().any(same) {
-                found.push(format!("the link told of {event:?}"));
+                found.push(format!("the link reported {event:?}"));
             }
         }
     }
-    if told < 4 {
-        found.push(format!("the link told of {told} changes; armed, started, stopped, at rest are four"));
+    if reported < 4 {
+        found
+            .push(format!("the link reported {reported} changes; armed, started, stopped, at rest are four"));
     }
     found.extend(pins_against(done, changes));
     found
