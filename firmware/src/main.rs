@@ -17,10 +17,15 @@ use rig_firmware::{adc_scan, encoders, log, memory, restart, tick, watchdog};
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
-    let Started { reset, kept, crystal, board } = start::start();
+    let Started { reset, crash_record, crystal, board } = start::start();
     defmt::info!("start after {}", reset);
-    if let Some(kept) = &kept {
-        defmt::error!("kept from tick {=u64}: {}: {=str}", kept.tick, kept.kind, kept.text.as_str());
+    if let Some(record) = &crash_record {
+        defmt::error!(
+            "crash record of tick {=u64}: {}: {=str}",
+            record.tick,
+            record.kind,
+            record.text.as_str()
+        );
     }
     let settings = Settings::load(SettingsFlash::new(board.flash)).await;
     let config = match settings.config() {
@@ -29,7 +34,8 @@ async fn main(spawner: Spawner) {
     };
     encoders::start();
     adc_scan::start(board.adc);
-    let state = ControlState::after(&config, restart::restart_kind(reset, kept.as_ref()), settings.intact());
+    let state =
+        ControlState::after(&config, restart::restart_kind(reset, crash_record.as_ref()), settings.intact());
     let ends = tick::start(config, state);
     watchdog::start();
 
@@ -38,7 +44,7 @@ async fn main(spawner: Spawner) {
         Ok(port) => port,
         Err(error) => panic!("the link's rate is not possible: {error:?}"),
     };
-    let identity = Identity { reset, crystal, kept };
+    let identity = Identity { reset, crystal, crash_record };
     let operator = Operator::new(identity, settings, config, ends.orders, ends.answers, ends.inputs);
     start_task(spawner, log::log(ends.events));
     start_task(spawner, link::send(tx, &mut buffers.sending, ends.rows, ends.health));

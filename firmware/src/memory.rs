@@ -8,13 +8,13 @@
 //! | DTCM, the rest | `.data`, `.bss`: state of the loop | no wait states, no cache: the tick's time is steady |
 //! | AXI SRAM, 480 KB | rows of the capture | largest memory; written by the tick, read by the link |
 //! | AXI SRAM, 32 KB | DMA buffers | DMA1 and DMA2 do not reach the DTCM |
-//! | SRAM4 | message kept over a reset | nothing clears it at reset or start |
+//! | SRAM4 | crash record, kept over a reset | nothing clears it at reset or start |
 //!
 //! **Caches.** The instruction cache is on: at 480 MHz flash answers after several wait states. The data
 //! cache stays off: state and stack are in DTCM, which needs none, and so no DMA buffer can be stale.
 //! Whoever turns it on must first make the region `DMA` non-cacheable.
 //!
-//! **Uninitialised regions.** `.capture`, `.dma` and `.kept` are not written at start. What lies there is
+//! **Uninitialised regions.** `.capture`, `.dma` and `.crash` are not written at start. What lies there is
 //! either made of atomics, for which any bits are a value, or cleared here before it is given away.
 
 use core::cell::UnsafeCell;
@@ -48,9 +48,9 @@ pub static M2_LATCH: [AtomicU32; M2_LATCHES] = [const { AtomicU32::new(0) }; M2_
 pub static CAPTURE_WORDS: [AtomicU32; CAPTURE_ROWS * ROW_WORDS] =
     [const { AtomicU32::new(0) }; CAPTURE_ROWS * ROW_WORDS];
 
-/// Words that survive a reset; `kept.rs` says what they mean.
-#[unsafe(link_section = ".kept.words")]
-pub static KEPT_WORDS: [AtomicU32; 64] = [const { AtomicU32::new(0) }; 64];
+/// Words that survive a reset; `crash_record.rs` says what they mean.
+#[unsafe(link_section = ".crash.words")]
+pub static CRASH_WORDS: [AtomicU32; 64] = [const { AtomicU32::new(0) }; 64];
 
 /// Size of the ring for received bytes: 20 ms at full rate.
 pub const RECEIVED_BYTES: usize = 4096;

@@ -1,20 +1,20 @@
 //! What happens when the firmware cannot go on, and why it started.
 //!
-//! A panic, a trap or an interrupt nobody handles: interrupts off, outputs safe, message kept, reset. The
+//! A panic, a trap or an interrupt nobody handles: interrupts off, outputs safe, crash record written, reset. The
 //! start after it finds the message and the reset flags, and the control core latches the fault from them:
 //! the rig stays down until a person has cleared it.
 
-use crate::{kept, outputs, tick};
+use crate::{crash_record, outputs, tick};
 use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::ExceptionFrame;
 use embassy_stm32::pac::RCC;
 use model_core::control::Restart;
-use rig_link::message::{KeptKind, KeptMessage, ResetCause};
+use rig_link::message::{CrashKind, CrashRecord, ResetCause};
 
 /// Ends the firmware after a panic.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
-    stop(KeptKind::Panic, format_args!("{info}"))
+    stop(CrashKind::Panic, format_args!("{info}"))
 }
 
 /// Ends the firmware after a hard fault.
@@ -24,7 +24,7 @@ pub fn trapped(frame: &ExceptionFrame) -> ! {
     let (cfsr, hfsr) = (scb.cfsr.read(), scb.hfsr.read());
     let (bfar, mmfar) = (scb.bfar.read(), scb.mmfar.read());
     stop(
-        KeptKind::HardFault,
+        CrashKind::HardFault,
         format_args!(
             "pc {:#010x} lr {:#010x} cfsr {cfsr:#010x} hfsr {hfsr:#010x} bfar {bfar:#010x} mmfar {mmfar:#010x}",
             frame.pc(),
@@ -35,13 +35,13 @@ pub fn trapped(frame: &ExceptionFrame) -> ! {
 
 /// Ends the firmware after an exception or interrupt nobody handles; the clock's failure is one (NMI, −14).
 pub fn unexpected(number: i16) -> ! {
-    stop(KeptKind::Exception, format_args!("unexpected exception {number}"))
+    stop(CrashKind::Exception, format_args!("unexpected exception {number}"))
 }
 
-fn stop(kind: KeptKind, message: core::fmt::Arguments<'_>) -> ! {
+fn stop(kind: CrashKind, message: core::fmt::Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
     outputs::make_safe();
-    kept::keep(kind, tick::now(), message);
+    crash_record::keep(kind, tick::now(), message);
     SCB::sys_reset()
 }
 
@@ -72,10 +72,10 @@ pub fn reset_cause() -> ResetCause {
 
 /// What the control core learns about the start.
 #[must_use]
-pub fn restart_kind(cause: ResetCause, kept: Option<&KeptMessage>) -> Restart {
-    match (kept.map(|message| message.kind), cause) {
-        (Some(KeptKind::Panic), _) => Restart::Panic,
-        (Some(KeptKind::HardFault | KeptKind::Exception), _) => Restart::HardFault,
+pub fn restart_kind(cause: ResetCause, record: Option<&CrashRecord>) -> Restart {
+    match (record.map(|record| record.kind), cause) {
+        (Some(CrashKind::Panic), _) => Restart::Panic,
+        (Some(CrashKind::HardFault | CrashKind::Exception), _) => Restart::HardFault,
         (None, ResetCause::Watchdog) => Restart::Watchdog,
         (None, _) => Restart::Ordinary,
     }

@@ -5,15 +5,15 @@
 //! tested is what is flashed.
 
 use crate::board::{self, Board};
-use crate::{clocks, kept, outputs, restart};
-use rig_link::message::{KeptMessage, ResetCause};
+use crate::{clocks, crash_record, outputs, restart};
+use rig_link::message::{CrashRecord, ResetCause};
 
 /// What the start found.
 pub struct Started {
     /// Why the chip started.
     pub reset: ResetCause,
-    /// What was kept from before the restart.
-    pub kept: Option<KeptMessage>,
+    /// The crash record from before the restart.
+    pub crash_record: Option<CrashRecord>,
     /// The clock comes from the 8 MHz of the ST-LINK.
     pub crystal: bool,
     /// Peripherals that drivers still need.
@@ -24,7 +24,7 @@ pub struct Started {
 #[must_use]
 pub fn start() -> Started {
     let reset = restart::reset_cause();
-    let kept = kept::take();
+    let crash_record = crash_record::take();
     let crystal = clocks::crystal_present();
     let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
     outputs::start();
@@ -35,7 +35,7 @@ pub fn start() -> Started {
     } else {
         defmt::warn!("no 8 MHz from the ST-LINK: times and speeds may be off by 1 %");
     }
-    Started { reset, kept, crystal, board }
+    Started { reset, crash_record, crystal, board }
 }
 
 /// Instruction cache and cycle counter; the data cache stays off (`memory.rs`).

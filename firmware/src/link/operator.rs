@@ -3,7 +3,7 @@
 //! One request at a time, so what is prepared here and lent to the tick has one owner at any moment.
 
 use crate::handover::Handover;
-use crate::settings::{Refused as NotKept, Settings};
+use crate::settings::{Refused as NotStored, Settings};
 use crate::tick::{Carried, Order};
 use crate::{capture, restart, tick};
 use embassy_time::{Duration, Instant, Timer};
@@ -14,7 +14,7 @@ use model_core::error::ParameterError;
 use model_core::selfcheck;
 use rig_link::inputs::Inputs;
 use rig_link::message::{
-    Answer, CAPTURE_CHUNK, Command, Hello, KeptMessage, PROTOCOL_VERSION, Rejection, ResetCause,
+    Answer, CAPTURE_CHUNK, Command, CrashRecord, Hello, PROTOCOL_VERSION, Rejection, ResetCause,
 };
 use rig_link::model::ModelRecord;
 use rig_link::program::{ProgramHeader, Upload};
@@ -33,8 +33,8 @@ pub struct Identity {
     pub reset: ResetCause,
     /// The clock comes from the crystal.
     pub crystal: bool,
-    /// What was kept from before.
-    pub kept: Option<KeptMessage>,
+    /// The crash record from before.
+    pub crash_record: Option<CrashRecord>,
 }
 
 /// The one who carries out requests.
@@ -112,7 +112,7 @@ impl Operator {
             Command::CaptureTrigger => self.order(Order::CaptureTrigger).await,
             Command::CaptureStatus => Answer::Capture(capture::info()),
             Command::CaptureRead { offset } => read_capture(offset),
-            Command::KeptMessage => Answer::Kept(self.identity.kept.clone()),
+            Command::CrashRecord => Answer::CrashRecord(self.identity.crash_record.clone()),
             Command::SelfCheck { case, steps } => self_check(case, steps),
             Command::Restart if !drives_off() => Answer::Rejected(Rejection::NotDisabled),
             Command::Restart => restart::by_command(),
@@ -130,7 +130,7 @@ impl Operator {
             counts_per_rev: self.settings.counts_per_rev(),
             reset: self.identity.reset,
             crystal: self.identity.crystal,
-            kept: self.identity.kept.is_some(),
+            crash_record: self.identity.crash_record.is_some(),
         }
     }
 
@@ -225,7 +225,7 @@ impl Operator {
             Err(error) => return out_of_range(&error),
         };
         if let Err(refused) = self.settings.keep_model(model).await {
-            return not_kept(&refused);
+            return not_stored(&refused);
         }
         self.config.set_model(&prepared);
         // The model alone: a swap of the whole configuration would forget the tare.
@@ -236,13 +236,13 @@ impl Operator {
     }
 
     /// What could not be stored is not used either.
-    async fn restore(&mut self, refused: NotKept) -> Answer {
+    async fn restore(&mut self, refused: NotStored) -> Answer {
         if let Ok(config) = self.settings.config()
             && let Err(answer) = self.change(&config).await
         {
             return answer;
         }
-        not_kept(&refused)
+        not_stored(&refused)
     }
 
     fn model(&self) -> Answer {
@@ -290,10 +290,10 @@ fn read_capture(offset: u32) -> Answer {
     }
 }
 
-fn not_kept(refused: &NotKept) -> Answer {
+fn not_stored(refused: &NotStored) -> Answer {
     match refused {
-        NotKept::OutOfRange(error) => out_of_range(error),
-        NotKept::Storage => Answer::Rejected(Rejection::Storage),
+        NotStored::OutOfRange(error) => out_of_range(error),
+        NotStored::Storage => Answer::Rejected(Rejection::Storage),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Records what the rig does without commanding it: telemetry for a time, or until it is enough.
 
-use rig_link::message::{Answer, Command, EventMessage, Hello, KeptMessage, Message};
+use rig_link::message::{Answer, Command, CrashRecord, EventMessage, Hello, Message};
 use rig_link::telemetry::{Health, TelemetryRow};
 
 use super::ask::{Ask, check_hello};
@@ -20,8 +20,8 @@ pub struct Recorded {
     pub hello: Hello,
     /// How its counts and ticks are to be read.
     pub scale: Scale,
-    /// What the firmware kept from before its last restart.
-    pub kept: Option<KeptMessage>,
+    /// The crash record from before its last restart.
+    pub crash_record: Option<CrashRecord>,
     /// The rows.
     pub rows: Vec<TelemetryRow>,
     /// What happened meanwhile.
@@ -54,7 +54,7 @@ impl Record {
             Command::Hello,
             Command::SettingGet { key: M1_COUNTS_KEY },
             Command::SettingGet { key: M2_COUNTS_KEY },
-            Command::KeptMessage,
+            Command::CrashRecord,
             Command::Telemetry { every_ticks },
         ];
         Self {
@@ -92,7 +92,7 @@ impl Record {
     }
 
     fn begin(&mut self, answers: &[Answer]) -> Result<(), InputError> {
-        let [hello, m1_counts, m2_counts, kept, telemetry] = answers else {
+        let [hello, m1_counts, m2_counts, record, telemetry] = answers else {
             return Err(InputError::new("the rig did not answer the greeting"));
         };
         let hello = check_hello(hello)?;
@@ -101,20 +101,20 @@ impl Record {
             Answer::Setting(state) => Ok(state.active as u32),
             other => Err(words::unexpected(other)),
         };
-        let kept = match kept {
-            Answer::Kept(kept) => kept.clone(),
+        let crash_record = match record {
+            Answer::CrashRecord(record) => record.clone(),
             other => return Err(words::unexpected(other)),
         };
         words::accepted(telemetry)?;
         self.notes.push(words::hello(&hello));
-        self.notes.extend(kept.iter().map(|kept| words::kept(kept, hello.tick_hz)));
+        self.notes.extend(crash_record.iter().map(|record| words::crash_record(record, hello.tick_hz)));
         let scale = Scale {
             tick_hz: hello.tick_hz,
             m1_counts_per_rev: counts(m1_counts)?,
             m2_counts_per_rev: counts(m2_counts)?,
         };
         let (rows, events, health) = (Vec::new(), Vec::new(), None);
-        self.recorded = Some(Recorded { hello, scale, kept, rows, events, health });
+        self.recorded = Some(Recorded { hello, scale, crash_record, rows, events, health });
         Ok(())
     }
 

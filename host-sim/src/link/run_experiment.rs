@@ -246,8 +246,9 @@ impl RunExperiment {
         };
         words::accepted(telemetry)?;
         self.notes.push(words::hello(&hello));
-        if hello.kept {
-            self.notes.push("it kept a message from before its last restart: rig monitor shows it".into());
+        if hello.crash_record {
+            self.notes
+                .push("there is a crash record from before its last restart: rig monitor shows it".into());
         }
         self.record.hello = hello;
         self.ask.push(Command::ProgramBegin(program::header(&self.experiment)));

@@ -4,7 +4,7 @@ use model_core::control::{Fault, Limit, Mode, Reason, Refusal};
 use model_core::extension::Extension;
 use model_core::friction::ModelKind;
 use rig_link::message::{
-    Answer, Command, EventKind, EventMessage, Hello, KeptKind, KeptMessage, Rejection, ResetCause,
+    Answer, Command, CrashKind, CrashRecord, EventKind, EventMessage, Hello, Rejection, ResetCause,
 };
 use rig_link::model::ModelRecord;
 use rig_link::settings;
@@ -89,13 +89,13 @@ pub fn hello(hello: &Hello) -> String {
     format!("firmware {} build {build}, started by {reset}{clock}", hello.version)
 }
 
-/// What the firmware kept from before its last restart.
+/// The crash record from before its last restart.
 #[must_use]
-pub fn kept(message: &KeptMessage, tick_hz: u32) -> String {
+pub fn crash_record(message: &CrashRecord, tick_hz: u32) -> String {
     let kind = match message.kind {
-        KeptKind::Panic => "stopped itself",
-        KeptKind::HardFault => "trapped",
-        KeptKind::Exception => "met an interrupt nobody handles",
+        CrashKind::Panic => "stopped itself",
+        CrashKind::HardFault => "trapped",
+        CrashKind::Exception => "met an interrupt nobody handles",
     };
     #[allow(clippy::cast_precision_loss)]
     let time_s = message.tick as f64 / f64::from(tick_hz.max(1));
@@ -129,7 +129,7 @@ pub fn command(command: &Command) -> &'static str {
         Command::CaptureTrigger => "triggering the capture",
         Command::CaptureStatus => "the question for the capture",
         Command::CaptureRead { .. } => "reading the capture",
-        Command::KeptMessage => "the question for the kept message",
+        Command::CrashRecord => "the question for the crash record",
         Command::SelfCheck { .. } => "the self-check",
         Command::Restart => "restart",
         Command::Inputs => "the question for the raw readings",

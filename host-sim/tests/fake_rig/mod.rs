@@ -124,7 +124,7 @@ impl Rig {
         match command {
             Command::Hello => Answer::Hello(self.hello.clone()),
             Command::KeepAlive => Answer::Done,
-            Command::KeptMessage => Answer::Kept(None),
+            Command::CrashRecord => Answer::CrashRecord(None),
             Command::SettingGet { key } => {
                 let info = by_key(key).unwrap();
                 let (active, default) =

@@ -48,7 +48,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// The checksum of `bytes`, as used in frames, for capture files and for kept messages.
+/// The checksum of `bytes`, as used in frames, for capture files and for crash records.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)

@@ -20,8 +20,8 @@ pub const PROTOCOL_VERSION: u16 = 2;
 /// The most bytes of a capture in one answer.
 pub const CAPTURE_CHUNK: usize = 480;
 
-/// The most characters of the message kept from before a restart.
-pub const KEPT_TEXT: usize = 200;
+/// The most characters of the text of a crash record.
+pub const CRASH_TEXT: usize = 200;
 
 /// From the host: a command, and the number its answer will carry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -100,8 +100,8 @@ pub enum Command {
         /// First byte.
         offset: u32,
     },
-    /// What the firmware kept from before its last restart.
-    KeptMessage,
+    /// The crash record: what the firmware kept from before its last restart.
+    CrashRecord,
     /// Run one case of the bit-identity check on the chip.
     SelfCheck {
         /// Number of the case in `model_core::selfcheck`.
@@ -174,8 +174,8 @@ pub enum Answer {
         /// The bytes.
         bytes: Vec<u8, CAPTURE_CHUNK>,
     },
-    /// What was kept from before the last restart.
-    Kept(Option<KeptMessage>),
+    /// The crash record from before the last restart.
+    CrashRecord(Option<CrashRecord>),
     /// Digest of a self-check.
     SelfCheck {
         /// Digest over the bits of all results.
@@ -237,8 +237,8 @@ pub struct Hello {
     pub reset: ResetCause,
     /// The clock comes from the crystal; if not, times and speeds are off by up to 1 %.
     pub crystal: bool,
-    /// Something was kept from before the last restart.
-    pub kept: bool,
+    /// There is a crash record from before the last restart.
+    pub crash_record: bool,
 }
 
 /// Why the chip started.
@@ -258,21 +258,21 @@ pub enum ResetCause {
     Other,
 }
 
-/// What the firmware kept in memory across its last restart.
+/// What the firmware kept in memory across its last restart, when it could not go on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct KeptMessage {
+pub struct CrashRecord {
     /// What stopped it.
-    pub kind: KeptKind,
+    pub kind: CrashKind,
     /// Control tick at that moment.
     pub tick: u64,
     /// The message: of a panic its words and place, of a trap the registers.
-    pub text: String<KEPT_TEXT>,
+    pub text: String<CRASH_TEXT>,
 }
 
 /// What stopped the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum KeptKind {
+pub enum CrashKind {
     /// A panic.
     Panic,
     /// A hard fault.

@@ -14,7 +14,7 @@ use crate::part::encoder_timer::Line;
 use crate::record::Saved;
 use host_sim::link::words;
 use model_core::control::{ControlSettings, Fault};
-use rig_link::message::{Answer, Command, KeptMessage, ResetCause};
+use rig_link::message::{Answer, Command, CrashRecord, ResetCause};
 use std::path::Path;
 
 /// The watchdog's count: 16 counts of 4 LSI cycles (firmware/src/watchdog.rs), and one LSI cycle of phase.
@@ -175,7 +175,7 @@ struct Seen {
     at_ns: u64,
     listener: ListeningHost,
     hello: Answer,
-    kept: Option<KeptMessage>,
+    crash_record: Option<CrashRecord>,
 }
 
 fn operate(endpoint: &mut Endpoint, case: &Case) -> Result<Seen, BenchError> {
@@ -196,11 +196,11 @@ fn operate(endpoint: &mut Endpoint, case: &Case) -> Result<Seen, BenchError> {
     let hello = listener.ask(endpoint, &Command::Hello)?;
     // Nobody at the rig, the arm switch still on: nothing may move by itself. A health record comes each 0.1 s.
     listener.listen(endpoint, endpoint.now_ns() + AFTERWARDS_NS)?;
-    let kept = match listener.ask(endpoint, &Command::KeptMessage)? {
-        Answer::Kept(kept) => kept,
+    let crash_record = match listener.ask(endpoint, &Command::CrashRecord)? {
+        Answer::CrashRecord(crash_record) => crash_record,
         _ => None,
     };
-    Ok(Seen { at_ns, listener, hello, kept })
+    Ok(Seen { at_ns, listener, hello, crash_record })
 }
 
 /// Lets a fault happen, and judges.
@@ -262,14 +262,14 @@ pub(super) fn verdict(
     }
     // Only a trap leaves a message, which is in the log and over the link.
     let trapped = matches!(case.expected, Expected::Restart(_, Some(Fault::HardFault)));
-    match &seen.kept {
-        Some(kept) if trapped && kept.text.starts_with("pc ") => {
-            if !log.lines.iter().any(|line| line.contains(kept.text.as_str())) {
-                problems.push(format!("the log does not have the kept message: {}", kept.text));
+    match &seen.crash_record {
+        Some(crash_record) if trapped && crash_record.text.starts_with("pc ") => {
+            if !log.lines.iter().any(|line| line.contains(crash_record.text.as_str())) {
+                problems.push(format!("the log does not have the crash record: {}", crash_record.text));
             }
         }
         None if !trapped => {}
-        other => problems.push(format!("what it kept: {other:?}")),
+        other => problems.push(format!("crash record: {other:?}")),
     }
     if log.malformed > 0 {
         problems.push(format!("{} frames of the log could not be decoded", log.malformed));
