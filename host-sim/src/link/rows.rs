@@ -3,7 +3,7 @@
 //! Time is the tick counter over the tick rate, from the start of the experiment or of the recording. Angles
 //! come from exact counts. Single-precision values stand in the log as the shortest decimal that names them.
 
-use rig_link::telemetry::TelemetryRow;
+use rig_link::telemetry::{CHANNELS, TelemetryRow};
 
 use crate::files::log::Log;
 use crate::files::number;
@@ -59,8 +59,9 @@ pub fn log_from(rows: &[TelemetryRow], scale: &Scale, zero: Zero, first_tick: u6
     log.set_signal(Signal::M2Speed, single(|row| row.m2_speed_rad_s));
     log.set_signal(Signal::NormalForce, single(|row| row.normal_force_n));
     log.set_signal(Signal::FrictionTorque, single(|row| row.friction_torque_nm));
-    log.set_numbers("m2_speed_ref_rad_s", single(|row| row.m2_speed_ref_rad_s));
-    log.set_numbers("predicted_friction_torque_nm", single(|row| row.predicted_friction_torque_nm));
+    for channel in CHANNELS {
+        log.set_numbers(channel.column, single(channel.of_row));
+    }
     log
 }
 

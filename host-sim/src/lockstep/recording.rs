@@ -5,6 +5,7 @@ use crate::files::number::{angle_rad, widen};
 use crate::files::signal::Signal;
 use crate::plant::{PERIOD_S, Truth};
 use model_core::control::{Fault, LimitSet, Record};
+use rig_link::telemetry::CHANNELS;
 
 /// One tick of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,8 +75,9 @@ impl Recording {
         log.set_signal(Signal::M2Speed, single(|r| r.m2_speed_rad_s));
         log.set_signal(Signal::NormalForce, single(|r| r.normal_force_n));
         log.set_signal(Signal::FrictionTorque, single(|r| r.friction_torque_nm));
-        log.set_numbers("m2_speed_ref_rad_s", single(|r| r.m2_speed_ref_rad_s));
-        log.set_numbers("predicted_friction_torque_nm", single(|r| r.predicted_friction_torque_nm));
+        for channel in CHANNELS {
+            log.set_numbers(channel.column, single(channel.of_record));
+        }
         log
     }
 }

@@ -1,8 +1,7 @@
 //! From the control core's types to what travels: enumerations become their stable numbers.
 
 use crate::message::{Answer, EventKind, EventMessage};
-use crate::telemetry::TelemetryRow;
-use model_core::control::{self, Fault, Record, Refused};
+use model_core::control::{self, Fault, Refused};
 
 impl From<Refused> for Answer {
     fn from(refused: Refused) -> Self {
@@ -37,35 +36,5 @@ impl From<control::Event> for EventMessage {
             _ => EventKind::Other,
         };
         Self { tick: event.tick, kind }
-    }
-}
-
-impl TelemetryRow {
-    /// The row of one tick; `sequence` and `cycles` are the sender's.
-    #[must_use]
-    #[inline]
-    pub fn new(record: &Record, sequence: u32, cycles: u32) -> Self {
-        Self {
-            sequence,
-            tick: record.tick,
-            m1_torque_ref_nm: record.m1_torque_ref_nm,
-            m1_torque_nm: record.m1_torque_nm,
-            m1_count: record.m1_count,
-            m2_torque_ref_nm: record.m2_torque_ref_nm,
-            m2_torque_nm: record.m2_torque_nm,
-            m2_count: record.m2_count,
-            m2_speed_ref_rad_s: record.m2_speed_ref_rad_s,
-            m2_speed_rad_s: record.m2_speed_rad_s,
-            normal_force_n: record.normal_force_n,
-            friction_torque_nm: record.friction_torque_nm,
-            predicted_friction_torque_nm: record.predicted_friction_torque_nm,
-            supply_v: record.supply_v,
-            mode: record.mode.number(),
-            fault: record.fault.map_or(0, Fault::number),
-            limits: record.limits.0,
-            sequencer: record.sequencer as u8,
-            experiment_tick: record.experiment_tick,
-            cycles,
-        }
     }
 }

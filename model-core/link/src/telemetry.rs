@@ -3,7 +3,12 @@
 //! A row holds what a line of the log needs. Positions travel as counts, so that the host's angles do
 //! not drift and lose no digit. Rows are numbered where the control tick offers them: a gap in the
 //! numbers is a lost row, whoever lost it.
+//!
+//! A channel is declared here and nowhere else: its member of the row, where its value comes from in
+//! [`TelemetryRow::new`], and its column of the log in [`CHANNELS`]. A new one goes to the end of the row, raises
+//! [`crate::message::PROTOCOL_VERSION`] and changes the bytes in `tests/frames.rs`.
 
+use model_core::control::{Fault, Record};
 use serde::{Deserialize, Serialize};
 
 /// One row.
@@ -50,6 +55,61 @@ pub struct TelemetryRow {
     /// Processor cycles from entry to exit of the last tick.
     pub cycles: u32,
 }
+
+impl TelemetryRow {
+    /// The row of one tick; `sequence` and `cycles` are the sender's.
+    #[must_use]
+    #[inline]
+    pub fn new(record: &Record, sequence: u32, cycles: u32) -> Self {
+        Self {
+            sequence,
+            tick: record.tick,
+            m1_torque_ref_nm: record.m1_torque_ref_nm,
+            m1_torque_nm: record.m1_torque_nm,
+            m1_count: record.m1_count,
+            m2_torque_ref_nm: record.m2_torque_ref_nm,
+            m2_torque_nm: record.m2_torque_nm,
+            m2_count: record.m2_count,
+            m2_speed_ref_rad_s: record.m2_speed_ref_rad_s,
+            m2_speed_rad_s: record.m2_speed_rad_s,
+            normal_force_n: record.normal_force_n,
+            friction_torque_nm: record.friction_torque_nm,
+            predicted_friction_torque_nm: record.predicted_friction_torque_nm,
+            supply_v: record.supply_v,
+            mode: record.mode.number(),
+            fault: record.fault.map_or(0, Fault::number),
+            limits: record.limits.0,
+            sequencer: record.sequencer as u8,
+            experiment_tick: record.experiment_tick,
+            cycles,
+        }
+    }
+}
+
+/// A column of the log beside those that every log has.
+#[derive(Debug, Clone, Copy)]
+pub struct Channel {
+    /// Its name, with the unit.
+    pub column: &'static str,
+    /// Its value in a row.
+    pub of_row: fn(&TelemetryRow) -> f32,
+    /// Its value in a tick of the core: for a simulation, which has no rows.
+    pub of_record: fn(&Record) -> f32,
+}
+
+/// The columns of the log beside those that every log has, in their order.
+pub const CHANNELS: &[Channel] = &[
+    Channel {
+        column: "m2_speed_ref_rad_s",
+        of_row: |row| row.m2_speed_ref_rad_s,
+        of_record: |record| record.m2_speed_ref_rad_s,
+    },
+    Channel {
+        column: "predicted_friction_torque_nm",
+        of_row: |row| row.predicted_friction_torque_nm,
+        of_record: |record| record.predicted_friction_torque_nm,
+    },
+];
 
 /// Counters and state, for a display and for a run's summary.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
