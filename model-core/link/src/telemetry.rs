@@ -9,6 +9,7 @@
 //! [`crate::message::PROTOCOL_VERSION`] and changes the bytes in `tests/frames.rs`.
 
 use model_core::control::{Fault, Record};
+use model_core::real::Real;
 use serde::{Deserialize, Serialize};
 
 /// One row.
@@ -54,6 +55,8 @@ pub struct TelemetryRow {
     pub experiment_tick: u32,
     /// Processor cycles from entry to exit of the last tick.
     pub cycles: u32,
+    /// What the observer's model leaves of the friction torque: running mean square. Its root is the host's work.
+    pub residual_mean_square_nm2: f32,
 }
 
 impl TelemetryRow {
@@ -82,6 +85,7 @@ impl TelemetryRow {
             sequencer: record.sequencer as u8,
             experiment_tick: record.experiment_tick,
             cycles,
+            residual_mean_square_nm2: record.residual_mean_square_nm2,
         }
     }
 }
@@ -108,6 +112,11 @@ pub const CHANNELS: &[Channel] = &[
         column: "predicted_friction_torque_nm",
         of_row: |row| row.predicted_friction_torque_nm,
         of_record: |record| record.predicted_friction_torque_nm,
+    },
+    Channel {
+        column: "residual_rms_nm",
+        of_row: |row| Real::sqrt(row.residual_mean_square_nm2),
+        of_record: Record::residual_rms_nm,
     },
 ];
 

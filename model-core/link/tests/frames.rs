@@ -21,7 +21,7 @@ fn receive<M: serde::de::DeserializeOwned>(bytes: &[u8]) -> std::vec::Vec<Result
 
 prop_compose! {
     fn row()(
-        numbers in any::<[f32; 10]>(),
+        numbers in any::<[f32; 11]>(),
         counts in any::<[i64; 2]>(),
         tick in any::<u64>(),
         words in any::<[u32; 3]>(),
@@ -37,6 +37,7 @@ prop_compose! {
             m2_speed_ref_rad_s: n[4], m2_speed_rad_s: n[5], normal_force_n: n[6], friction_torque_nm: n[7],
             predicted_friction_torque_nm: n[8], supply_v: n[9],
             mode: small[0], fault: small[1], limits, sequencer: small[2], experiment_tick: words[1], cycles: words[2],
+            residual_mean_square_nm2: n[10],
         }
     }
 }
@@ -171,9 +172,9 @@ fn a_telemetry_row_at_1_khz_uses_less_than_two_thirds_of_the_line() {
 /// The wire format is the order and the types of the members: who changes them raises `PROTOCOL_VERSION` and
 /// writes the new bytes here.
 #[test]
-fn the_bytes_of_version_2_stay_as_they_are() {
+fn the_bytes_of_version_3_stay_as_they_are() {
     use rig_link::message::PROTOCOL_VERSION;
-    assert_eq!(PROTOCOL_VERSION, 2);
+    assert_eq!(PROTOCOL_VERSION, 3);
     let hex = |bytes: std::vec::Vec<u8>| {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect::<std::string::String>()
     };
@@ -192,10 +193,11 @@ fn the_bytes_of_version_2_stay_as_they_are() {
         sequencer: 2,
         experiment_tick: 71,
         cycles: 20_000,
+        residual_mean_square_nm2: 0.5,
         ..TelemetryRow::default()
     };
     assert_eq!(
         hex(frame_of(&Message::Telemetry(row))),
-        "0a0107f0a204cdcc4c4001010101010101010101010104ffcb3a0101010101010101010101010103c8400101010101010102030b050247a09c012b4d293400"
+        "0a0107f0a204cdcc4c4001010101010101010101010104ffcb3a0101010101010101010101010103c84001010101010101020307050247a09c010101063fd3afa1fd00"
     );
 }
