@@ -14,14 +14,14 @@ pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
     let readings = c.rig.readings(SPAN_S)?;
     c.no_fault("armed at zero torque", advice)?;
     let s = c.rig.settings;
-    let most = f64::from(s.torque_watch.offset_tolerance_nm);
+    let most = s.torque_watch.offset_tolerance_nm;
     for (name, code, drive) in [("M1", readings.code[2], s.m1), ("M2", readings.code[3], s.m2)] {
         let torque = (code - f64::from(drive.monitor_zero_code)) * f64::from(drive.monitor_nm_per_code);
         c.check(
             &format!("torque of {name}, enabled at zero"),
             format!("{torque:+.3} N m"),
             &format!("± {most} N m"),
-            torque.abs() <= most,
+            torque.abs() <= f64::from(most),
             "trim the drive's offset",
         );
     }

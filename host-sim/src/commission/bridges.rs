@@ -115,7 +115,7 @@ fn one(
     let spill = crosstalk.slope * largest;
     c.check(
         &format!("{name}, what the other bridge shows"),
-        format!("{spill:+.0} codes at the largest load"),
+        format!("{} codes at the largest load", spill.round() + 0.0),
         &format!("{:.0}", CROSSTALK * 65536.0),
         spill.abs() <= CROSSTALK * 65536.0,
         "the load reaches the other bridge: hang it where it does not",

@@ -12,12 +12,12 @@ pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
     let [friction, normal, m1, m2, supply] = readings.code;
     let s = c.rig.settings;
     let volt = supply * f64::from(s.supply.volt_per_code);
-    let (low, high) = (f64::from(s.supply.low_v), f64::from(s.supply.high_v));
+    let (low, high) = (s.supply.low_v, s.supply.high_v);
     c.check(
         "supply",
         format!("{volt:.2} V"),
         &format!("{low} to {high} V"),
-        (low..=high).contains(&volt),
+        (f64::from(low)..=f64::from(high)).contains(&volt),
         "look at the drives' supply and at its divider on PA0",
     );
     for (name, code, bridge, unit) in [
@@ -27,8 +27,8 @@ pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
         let (low, high) = (f64::from(bridge.saturated_low_code), f64::from(bridge.saturated_high_code));
         let inside = code > low && code < high;
         let value = (code - f64::from(bridge.zero_code)) * f64::from(bridge.unit_per_code);
-        let most = f64::from(bridge.tare_limit);
-        let (passed, advice) = match (inside, value.abs() <= most) {
+        let most = bridge.tare_limit;
+        let (passed, advice) = match (inside, value.abs() <= f64::from(most)) {
             (false, _) => {
                 (false, "at a rail: the bridge is not connected, a wire is broken, or its supply is missing")
             }
@@ -42,14 +42,14 @@ pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
         let allowed = format!("codes {low:.0} to {high:.0}, and no more than {most} {unit} from zero");
         c.check(name, format!("code {code:.0}, {value:.3} {unit}"), &allowed, passed, advice);
     }
-    let most = f64::from(s.torque_watch.offset_tolerance_nm);
+    let most = s.torque_watch.offset_tolerance_nm;
     for (name, code, drive) in [("M1 torque monitor", m1, s.m1), ("M2 torque monitor", m2, s.m2)] {
         let torque = (code - f64::from(drive.monitor_zero_code)) * f64::from(drive.monitor_nm_per_code);
         c.check(
             name,
             format!("code {code:.0}, {torque:.3} N m"),
             &format!("± {most} N m with the drive off"),
-            torque.abs() <= most,
+            torque.abs() <= f64::from(most),
             "the drive's monitor output is not connected, or monitor_zero_code is that of another amplifier",
         );
     }

@@ -148,7 +148,8 @@ impl<'a> Rig<'a> {
 
     /// Asks one thing.
     pub fn ask(&mut self, command: Command) -> Result<Answer, InputError> {
-        let (wait, name) = (patience(&command), words::command(&command));
+        // A person waits anyway, and a served bench may be slow.
+        let (wait, name) = (5 * patience(&command), words::command(&command));
         let id = self.client.request(command);
         let asked = Instant::now();
         loop {
@@ -310,7 +311,7 @@ impl<'a> Rig<'a> {
     /// The fault that is latched, in words.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
-        (self.row.fault != 0).then(|| words::fault(self.row.fault))
+        (self.row.fault != 0).then(|| sentence(self.row.fault))
     }
 
     /// Whether the cause of a fault is there now.
@@ -486,6 +487,11 @@ impl Readings {
     pub fn named(&self) -> impl Iterator<Item = (&'static str, f64, f64)> {
         CHANNELS.into_iter().zip(self.code).zip(self.deviation).map(|((name, code), std)| (name, code, std))
     }
+}
+
+/// A fault in words, to go on behind.
+pub(super) fn sentence(fault: u8) -> String {
+    words::fault(fault).trim_end_matches('.').to_owned()
 }
 
 /// Ticks in seconds. The rate is fixed by the board.

@@ -41,7 +41,7 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
         let readings = c.rig.readings(SPAN_S)?;
         let advice = "the drive does not follow its torque reference: its wire is open or its cores are exchanged, or \
                       rated torque and monitor scale are those of another drive";
-        c.no_fault(&format!("{name} at {level:+} N m"), advice)?;
+        c.no_fault(&format!("{name} at {level:+.2} N m"), advice)?;
         let count =
             |row: &rig_link::telemetry::TelemetryRow| if motor == 0 { row.m1_count } else { row.m2_count };
         moved.push((*level, count(&c.rig.row) - count(&before)));
@@ -55,24 +55,24 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
         c.check(name, "no line", "different torques", false, "the reference does not change");
         return c.settle();
     };
-    let gain = f64::from(s.torque_watch.gain_tolerance);
+    let gain = s.torque_watch.gain_tolerance;
     c.check(
         &format!("{name}, monitor over reference"),
         format!("{:.4}", fit.slope),
         &format!("1 ± {gain}"),
-        (fit.slope - 1.0).abs() <= gain,
+        (fit.slope - 1.0).abs() <= f64::from(gain),
         if fit.slope < 0.0 {
             "the torque has the other sign: the cores of its reference are exchanged, or rig settings set mN.reversed"
         } else {
             "rated torque or monitor scale are those of another drive"
         },
     );
-    let offset = f64::from(s.torque_watch.offset_tolerance_nm);
+    let offset = s.torque_watch.offset_tolerance_nm;
     c.check(
         &format!("{name}, offset"),
         format!("{:+.4} N m", fit.offset),
         &format!("± {offset} N m"),
-        fit.offset.abs() <= offset,
+        fit.offset.abs() <= f64::from(offset),
         "trim the drive's offset",
     );
     let most = 0.1 * levels.iter().fold(0.0, |most: f64, level| most.max(level.abs()));
@@ -98,7 +98,7 @@ fn direction(c: &mut Commissioning<'_, '_>, name: &str, moved: &[(f64, i64)]) ->
         moved.iter().any(|(level, counts)| *level * (*counts).signum() as f64 <= 0.0 && *level != 0.0);
     let still = moved.iter().any(|(level, counts)| *level != 0.0 && counts.abs() < LEAST_COUNTS);
     let shown: Vec<String> =
-        moved.iter().map(|(level, counts)| format!("{level:+} N m: {counts:+}")).collect();
+        moved.iter().map(|(level, counts)| format!("{level:+.2} N m: {counts:+}")).collect();
     c.check(
         &format!("{name}, counts with the torque"),
         shown.join(", "),

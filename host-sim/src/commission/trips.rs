@@ -7,8 +7,8 @@
 use model_core::control::{Fault, M2Mode, Mode};
 use rig_link::message::{Answer, Command};
 
+use super::rig::sentence;
 use super::{Commissioning, Stop};
-use crate::link::words;
 
 /// The force limit while it is provoked by hand, N.
 const FORCE_N: f32 = 10.0;
@@ -89,7 +89,7 @@ fn stands_in_the_way(c: &mut Commissioning<'_, '_>, fault: Fault, ask: &str, bac
     if !refused {
         c.rig.disarm()?;
     }
-    seen(c, &format!("{}, arming refused", words::fault(fault.number())), there && refused, None)?;
+    seen(c, &format!("{}, arming refused", sentence(fault.number())), there && refused, None)?;
     let gone = c.rig.until(back, |_, rig| !rig.has_cause(fault))?;
     c.check(back, if gone { "seen" } else { "not seen" }, "seen", gone, "the cause does not go away");
     c.settle()
@@ -115,7 +115,7 @@ fn moving(c: &mut Commissioning<'_, '_>, wanted: Fault, torque_nm: f32, limit: &
     let fault = c.rig.wait_for_fault(2.0)?;
     let found = c.rig.fault();
     c.rig.disarm()?;
-    seen(c, &format!("{}, limit {limit}", words::fault(wanted.number())), fault == Some(wanted), found)?;
+    seen(c, &format!("{}, limit {limit}", sentence(wanted.number())), fault == Some(wanted), found)?;
     c.rig.clear_fault()?;
     Ok(c.rig.restore()?)
 }
