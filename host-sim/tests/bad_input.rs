@@ -93,7 +93,7 @@ fn good_input_is_not_refused() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.lines().count() == 1 && said.starts_with("rig: wrote "), "{said}");
     let names = |folder: &str| fs::read_dir(bench.path().join(folder)).unwrap().count();
-    assert_eq!(names("out/deep"), 2);
+    assert_eq!(names("out/deep"), 3);
 }
 
 #[test]
@@ -279,7 +279,7 @@ fn earlier_results_survive_a_refusal() {
     bench.put("log.csv", &log().replacen(",80,", ",NaN,", 1));
     bench.refused(&bench.predict(&["--out", folder]));
     assert_eq!(fs::read(out.path().join("prediction.csv")).unwrap(), before);
-    assert_eq!(fs::read_dir(out.path()).unwrap().count(), 2);
+    assert_eq!(fs::read_dir(out.path()).unwrap().count(), 3);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::common::{SetArgs, say};
+use super::prediction_page;
 use super::progress::Progress;
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
@@ -25,6 +26,8 @@ use crate::input_error::InputError;
 use crate::predict::drive_model;
 use crate::predict::observed_slip::{self, predict_by_observed_slip};
 use crate::predict::{Comparison, ContactInputs, simulate_friction};
+use crate::report::prediction::Prediction;
+use crate::report::{Block, Page, Table, value};
 
 /// Identify the parameters of a friction model, or of a drive, from logs
 #[derive(clap::Args, Debug)]
@@ -156,6 +159,36 @@ impl Part {
         text
     }
 
+    /// Parameters with their intervals, and what is left of each log.
+    fn page(&self, names: &[&str], nrmse: f64, blocks: Vec<Block>) -> Page {
+        let rows = names.iter().filter_map(|name| {
+            let p = self.parameters.get(*name)?;
+            let found = p.std.map_or_else(
+                || format!("{} (not determined by these logs)", value::plain(p.value)),
+                |std| value::with_uncertainty(p.value, std),
+            );
+            let interval = p.low_95.zip(p.high_95).map_or("–".to_owned(), |(low, high)| {
+                format!("{} to {}", value::plain(low), value::plain(high))
+            });
+            Some(vec![(*name).to_owned(), found, interval])
+        });
+        let head = ["parameter", "value ± standard deviation", "95 % interval"].map(str::to_owned).to_vec();
+        let mut all = vec![Block::Table(Table { head, rows: rows.collect() })];
+        if !self.correlations.is_empty() {
+            let rows =
+                self.correlations.iter().map(|(pair, c)| vec![pair.clone(), format!("{c:.2}")]).collect();
+            let head = ["parameters", "correlation"].map(str::to_owned).to_vec();
+            all.push(Block::Heading("Parameters that these logs tell apart badly".into()));
+            all.push(Block::Table(Table { head, rows }));
+        }
+        all.extend(blocks);
+        let lead = format!(
+            "Residual of {:.2} % RMS on the logs that were fitted; other logs decide.",
+            100.0 * nrmse
+        );
+        Page { title: "Fit".into(), lead, blocks: all }
+    }
+
     fn print(&self, names: &[&str]) {
         for name in names {
             let Some(p) = self.parameters.get(*name) else { continue };
@@ -237,7 +270,17 @@ impl Fit {
             say(&format!("relative force error {:.3} %", 100.0 * directed.relative_force_error));
         }
         output.write("model.toml", drive_toml(&main, &symmetric, directed.as_ref()))?;
+        let mut blocks = Vec::new();
         for (i, comparison) in symmetric.comparisons.iter().enumerate() {
+            let prediction = Prediction {
+                name: format!("Effort, {}", logs.get(i).map_or("", |log| log.source.as_str())),
+                quantity: if motion == Motion::Linear { "force, N" } else { "torque, N m" },
+                time_s: &comparison.time_s,
+                measured: &comparison.measured,
+                predicted: &comparison.predicted,
+                over: vec![("time, s", comparison.time_s.clone())],
+            };
+            blocks.extend(prediction.blocks());
             let residual =
                 comparison.measured.iter().zip(&comparison.predicted).map(|(m, p)| m - p).collect();
             let columns = (
@@ -248,6 +291,8 @@ impl Fit {
             );
             output.write_table(&table_name(i, records.len()), &table(columns))?;
         }
+        let page = main.page(symmetric.names, symmetric.relative_force_error, blocks);
+        output.write("report.html", page.to_html())?;
         let summary = DriveSummary {
             kind: "drive",
             symmetric: main,
@@ -271,6 +316,7 @@ fn write_contact(
     let mut plain = fit.model.clone();
     plain.extensions.clear();
     let (mut error, mut signal) = (0.0, 0.0);
+    let mut blocks = Vec::new();
     for (i, log) in logs.iter().enumerate() {
         let signals = log.contact()?;
         let comparison = Comparison {
@@ -280,6 +326,10 @@ fn write_contact(
         let residual = comparison.residual();
         error += residual.iter().map(|x| x * x).sum::<f64>();
         signal += comparison.measured.iter().map(|x| x * x).sum::<f64>();
+        let name = format!("Friction torque, {}", log.source);
+        blocks.extend(
+            prediction_page::friction(&name, &signals, &comparison.measured, &comparison.predicted).blocks(),
+        );
         let time_s = signals.time_s.to_vec();
         let mut table = table((time_s, comparison.measured, comparison.predicted, residual));
         table.set_numbers(observed_slip::COLUMN, predict_by_observed_slip(&plain, rig, log)?);
@@ -292,6 +342,7 @@ fn write_contact(
         undetermined.iter().map(|name| format!("# {name}: not determined by these logs\n")).collect();
     output.write("model.toml", found.comments() + &remarks + &fit.model.to_toml())?;
     found.print(&names);
+    output.write("report.html", found.page(&names, nrmse, blocks).to_html())?;
     for name in &fit.on_bound {
         say(&format!("{name} ended on a bound: it is outside of what is searched, or not needed"));
     }

@@ -15,6 +15,7 @@ mod keeper;
 mod monitor;
 mod port;
 mod predict;
+mod prediction_page;
 mod record;
 mod rivals;
 mod run;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::common::{SetArgs, say};
+use super::prediction_page;
 use crate::files::drive_model::DriveModel;
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
@@ -19,6 +20,8 @@ use crate::predict::{
     Comparison, ContactInputs, acts_on_friction, effects_elsewhere, nrmse as nrmse_of, predict_drive,
     predict_normal_force, simulate_friction,
 };
+use crate::report::prediction::Prediction;
+use crate::report::{Block, Page, Table};
 
 /// Drive a model with the measured inputs of a log; write measured, predicted, residual
 #[derive(clap::Args, Debug)]
@@ -45,6 +48,7 @@ Writes prediction.csv:
   predicted_by_observed_slip       friction torque one step ahead, N m; models without effects on friction
   normal_force_measured_n, ...     N, from M1's torque
   m2_torque_measured_nm, ...       N m, from inertia, bearing and measured friction, means over 10 ms
+report.html, with the residual in bins of speed, normal force, place on the disc and time;
 and summary.json with the nrmse (RMS of the residual over RMS of the measured signal) of each subsystem:
 friction, pressure, drive; and nrmse_by_observed_slip, that of the one-step prediction.
 With --out X.parquet the table goes to X.parquet and the summary beside it.
@@ -113,6 +117,9 @@ impl Predict {
         let mut table = Log::default();
         table.set_signal(Signal::Time, signals.time_s.to_vec());
         let mut nrmse = BTreeMap::from([("friction", friction.nrmse())]);
+        let mut blocks =
+            prediction_page::friction("Friction torque", &signals, &friction.measured, &friction.predicted)
+                .blocks();
         add(&mut table, ["measured", "predicted", "residual"], friction);
         let mut by_observed_slip = None;
         if !acts_on_friction(&model) {
@@ -123,12 +130,17 @@ impl Predict {
         if let Some(m1_torque_nm) = log.signal(Signal::M1Torque) {
             let pressure = predict_normal_force(&rig, signals.time_s, m1_torque_nm, signals.normal_force_n);
             nrmse.insert("pressure", pressure.nrmse());
+            let over =
+                vec![("torque of M1, N m", m1_torque_nm.to_vec()), ("time, s", signals.time_s.to_vec())];
+            blocks.extend(of("Normal force", "normal force, N", signals.time_s, &pressure, over));
             let names = ["normal_force_measured_n", "normal_force_predicted_n", "normal_force_residual_n"];
             add(&mut table, names, pressure);
         }
         if let Some(m2_torque_nm) = log.signal(Signal::M2Torque) {
             let drive = predict_drive(&rig, &signals, m2_torque_nm);
             nrmse.insert("drive", drive.nrmse());
+            let over = prediction_page::of_contact(&signals);
+            blocks.extend(of("Torque of M2", "torque of M2, N m", signals.time_s, &drive, over));
             add(
                 &mut table,
                 ["m2_torque_measured_nm", "m2_torque_predicted_nm", "m2_torque_residual_nm"],
@@ -144,8 +156,8 @@ impl Predict {
             assumed: rig.assumed.clone(),
             effects_not_applied: effects_elsewhere(&model),
         };
-        finish(output, &table, &summary)?;
-        tell(&summary.nrmse);
+        finish(output, &table, &summary, page(&summary.nrmse, blocks))?;
+        show(&summary.nrmse);
         if let Some(nrmse) = by_observed_slip {
             say(&format!("friction  nrmse {nrmse:.3e} one step ahead, by the observed slip"));
         }
@@ -160,6 +172,9 @@ impl Predict {
         let (mut table, main) = (Log::default(), prediction.main);
         table.set_signal(Signal::Time, main.time_s);
         let main = Comparison { measured: main.measured, predicted: main.predicted };
+        let time_s = table.time_s().to_vec();
+        let over = vec![("time, s", time_s.clone())];
+        let blocks = of("Drive", "torque or force of the drive, N m or N", &time_s, &main, over);
         let mut nrmse = BTreeMap::from([("drive", main.nrmse())]);
         let measured = main.measured.clone();
         add(&mut table, ["measured", "predicted", "residual"], main);
@@ -174,8 +189,8 @@ impl Predict {
             nrmse,
             effects_not_applied: prediction.not_applied,
         };
-        finish(output, &table, &summary)?;
-        tell(&summary.nrmse);
+        finish(output, &table, &summary, page(&summary.nrmse, blocks))?;
+        show(&summary.nrmse);
         if !summary.effects_not_applied.is_empty() {
             say(&format!(
                 "effects of the file that are not applied: {}",
@@ -191,13 +206,42 @@ fn span_s(time_s: &[f64]) -> f64 {
     time_s.last().zip(time_s.first()).map_or(0.0, |(end, start)| end - start)
 }
 
-fn finish(mut output: OutputDir, table: &Log, summary: &impl Serialize) -> Result<(), InputError> {
+fn finish(
+    mut output: OutputDir,
+    table: &Log,
+    summary: &impl Serialize,
+    page: Page,
+) -> Result<(), InputError> {
     output.write_table("prediction.csv", table)?;
     output.write_json("summary.json", summary)?;
+    output.write("report.html", page.to_html())?;
     output.finish()
 }
 
-fn tell(nrmse: &BTreeMap<&'static str, Option<f64>>) {
+fn of(
+    name: &str,
+    quantity: &str,
+    time_s: &[f64],
+    comparison: &Comparison,
+    over: Vec<(&str, Vec<f64>)>,
+) -> Vec<Block> {
+    let (measured, predicted) = (&comparison.measured[..], &comparison.predicted[..]);
+    Prediction { name: name.into(), quantity, time_s, measured, predicted, over }.blocks()
+}
+
+fn page(nrmse: &BTreeMap<&'static str, Option<f64>>, blocks: Vec<Block>) -> Page {
+    let figure = |nrmse: &Option<f64>| {
+        nrmse.map_or("nothing but zero was measured".into(), |n| format!("{:.2} %", 100.0 * n))
+    };
+    let rows: Vec<Vec<String>> = nrmse.iter().map(|(name, n)| vec![(*name).to_owned(), figure(n)]).collect();
+    let head = ["signal", "RMS of the residual over RMS of the signal"].map(str::to_owned).to_vec();
+    let mut all = vec![Block::Table(Table { head, rows })];
+    all.extend(blocks);
+    let lead = "A model driven with the measured inputs of a log: what it predicts, what is left, and what that follows.";
+    Page { title: "Prediction".into(), lead: lead.into(), blocks: all }
+}
+
+fn show(nrmse: &BTreeMap<&'static str, Option<f64>>) {
     for (subsystem, nrmse) in nrmse {
         match nrmse {
             Some(nrmse) => say(&format!("{subsystem:9} nrmse {nrmse:.3e}")),

@@ -88,6 +88,9 @@ pub struct Chart {
     pub log_x: bool,
     /// The lines are curves in a plane (a loop), not functions of x: no simplification.
     pub plane: bool,
+    /// Every point is the mean of so many samples, the same for all lines: points get markers, and tell it. Empty: the
+    /// points are samples.
+    pub counts: Vec<usize>,
 }
 
 impl Chart {
@@ -119,15 +122,22 @@ impl Chart {
             .iter()
             .map(|w| format!("{{\"label\":{},\"range\":[{},{}]}}", quote(&w.label), w.range.0, w.range.1))
             .collect();
+        let counts: Vec<String> = self.counts.iter().map(usize::to_string).collect();
         format!(
-            "{{\"title\":{},\"x\":{},\"log\":{},\"panels\":[{}],\"windows\":[{}],\"traces\":[{}]}}",
+            "{{\"title\":{},\"x\":{},\"log\":{},\"counts\":[{}],\"panels\":[{}],\"windows\":[{}],\"traces\":[{}]}}",
             quote(&self.title),
             quote(&self.x_title),
             self.log_x,
+            counts.join(","),
             titles.join(","),
             windows.join(","),
             traces.join(",")
         )
+    }
+
+    /// Every point is written as it is.
+    fn is_exact(&self) -> bool {
+        self.plane || self.log_x || !self.counts.is_empty()
     }
 
     fn trace(&self, row: usize, line: &Line, first: bool, fine: &[(f64, f64)]) -> String {
@@ -135,7 +145,7 @@ impl Chart {
             let inside = fine.iter().any(|(from, to)| (*from..=*to).contains(&line.x[i]));
             if inside { line.fine_tolerance } else { line.tolerance }
         };
-        let kept = if self.plane || self.log_x {
+        let kept = if self.is_exact() {
             (0..line.x.len().min(line.y.len())).collect()
         } else {
             simplify::keep(&line.x, &line.y, tolerance)
@@ -148,7 +158,7 @@ impl Chart {
                 x.push(',');
                 y.push(',');
             }
-            if self.plane || self.log_x {
+            if self.is_exact() {
                 push_significant(&mut x, line.x[i]);
             } else {
                 push(&mut x, line.x[i], 4);

@@ -69,7 +69,8 @@ fn draw_panel(
                 .filter(|(x, y)| x.is_finite() && y.is_finite())
                 .filter(|(x, _)| shown.is_none_or(|(from, to)| chart.log_x || (from..=to).contains(x)))
                 .collect();
-            (line.name.as_str(), if chart.plane { every(&points) } else { envelope(&points) })
+            let exact = chart.plane || !chart.counts.is_empty();
+            (line.name.as_str(), if exact { every(&points) } else { envelope(&points) })
         })
         .collect();
     let (x, y) = (
@@ -97,6 +98,9 @@ fn draw_panel(
         .y_desc(panel.y_title.as_str())
         .draw()?;
     for ((name, points), colour) in lines.into_iter().zip(COLOURS.into_iter().cycle()) {
+        if !chart.counts.is_empty() {
+            axes.draw_series(points.iter().map(|point| Circle::new(*point, 3, colour.filled())))?;
+        }
         axes.draw_series(LineSeries::new(points, colour.stroke_width(2)))?
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour));

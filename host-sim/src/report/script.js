@@ -16,6 +16,7 @@
     series: "solid", brush: "dashdot", lugre: "solid", lugre_patch: "dot", modified_lugre: "dash",
     measured: "solid", reference: "dot",
   };
+  const symbol = { measured: "circle", series: "diamond", reference: "cross" };
   const width = { series: 2, measured: 1.4, reference: 1.4 };
   const query = window.matchMedia("(prefers-color-scheme: dark)");
   const scheme = () => (query.matches ? dark : light);
@@ -55,10 +56,13 @@
 
   function traces(chart, c) {
     return chart.traces.map((t) => ({
-      type: "scatter", mode: "lines", name: t.name, legendgroup: t.name, showlegend: t.legend, x: t.x, y: t.y,
+      type: "scatter", mode: chart.counts.length ? "lines+markers" : "lines", name: t.name, legendgroup: t.name, showlegend: t.legend, x: t.x, y: t.y,
       yaxis: "y" + axis(t.row), xaxis: "x",
       line: { color: c[t.role], dash: dash[t.role], width: width[t.role] || 1.7 },
-      hovertemplate: `%{y:.5~g}${unit(chart.panels[t.row])} at %{x:.6~g}${unit(chart.x)}`,
+      marker: { color: c[t.role], size: 7, symbol: symbol[t.role] || "circle" },
+      customdata: chart.counts,
+      hovertemplate: `%{y:.5~g}${unit(chart.panels[t.row])} at %{x:.6~g}${unit(chart.x)}`
+        + (chart.counts.length ? ", mean of %{customdata} samples" : ""),
     }));
   }
 
