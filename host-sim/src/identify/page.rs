@@ -133,10 +133,11 @@ fn over_coordinates(contact: &ContactPart, place: usize) -> Vec<Chart> {
             let mut rows = used.clone();
             rows.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
             let size = rows.len().div_ceil(BINS).max(FEWEST);
-            let (mut x, mut before, mut after) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut x, mut before, mut after, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
             let mut spread = 0.0;
             for bin in rows.chunks(size).filter(|bin| bin.len() >= FEWEST) {
                 let n = bin.len() as f64;
+                counts.push(bin.len());
                 x.push(bin.iter().map(|i| values[*i]).sum::<f64>() / n);
                 before.push(bin.iter().map(|i| residual(none, *i)).sum::<f64>() / n);
                 after.push(bin.iter().map(|i| residual(best, *i)).sum::<f64>() / n);
@@ -158,7 +159,7 @@ fn over_coordinates(contact: &ContactPart, place: usize) -> Vec<Chart> {
                 y_title: "mean residual, N m".into(),
                 lines: vec![line("baseline", &before, Role::Measured), line("answer", &after, Role::Series)],
             };
-            Some((spread, chart(&name, panel, window)))
+            Some((spread, Chart { counts, ..chart(&name, panel, window) }))
         })
         .collect();
     charts.sort_by(|a, b| b.0.total_cmp(&a.0));
