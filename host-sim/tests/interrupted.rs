@@ -5,6 +5,7 @@
 
 mod fake_rig;
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -12,7 +13,7 @@ use std::time::{Duration, Instant};
 use fake_rig::bench::Bench;
 use host_sim::files::journal::{self, Unfinished};
 use host_sim::files::log::Log;
-use model_core::control::Mode;
+use model_core::control::{Fault, Mode};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// Moments after the first row, s: the golden ratio's multiples lie nowhere in particular.
@@ -176,6 +177,25 @@ fn a_full_disk_stops_the_rig_and_keeps_what_was_there_already() {
         let log = whole_log(&run.out().join(journal::NAME), "could not be stored");
         assert!(log.len() > 10, "{}", log.len());
     }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_monitor_that_is_open_while_the_host_is_killed_sees_the_run_and_the_stop() {
+    let mut run = Run::plain();
+    run.wait_until_it_runs(0.3);
+    let arguments = ["monitor", "--plain", "--seconds", "60", "--port", &run.bench.port];
+    let mut monitor = run.bench.command(&arguments);
+    let mut monitor = monitor.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut lines = BufReader::new(monitor.stdout.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.starts_with("running")), "it sees the run of the other command");
+    run.signal(Signal::KILL);
+    run.end();
+    run.is_safe_within(Duration::from_millis(500));
+    let said = format!("fault {}", Fault::LinkLost.number());
+    assert!(lines.any(|line| line.contains(&said)), "it took the port over and shows why the rig stopped");
+    monitor.kill().unwrap();
+    monitor.wait().unwrap();
 }
 
 #[test]

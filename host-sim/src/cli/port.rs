@@ -8,6 +8,7 @@ use crate::link::ask::Ask;
 use crate::link::client::Client;
 use crate::link::procedure::{Procedure, Transport, perform};
 use crate::link::serial::Serial;
+use crate::link::share::Listener;
 use crate::link::usb;
 use rig_link::message::{Answer, Command};
 
@@ -22,7 +23,7 @@ pub(super) struct PortArgs {
 
 /// An open link.
 pub(super) struct Port {
-    serial: Serial,
+    serial: Box<dyn Transport>,
     client: Client,
 }
 
@@ -33,7 +34,22 @@ impl PortArgs {
             Some(name) => name.clone(),
             None => usb::only_probe()?,
         };
-        Ok(Port { serial: Serial::open(&name)?, client: Client::new() })
+        Ok(Port { serial: Box::new(Serial::open(&name)?), client: Client::new() })
+    }
+
+    /// Opens the port, or listens to the command that holds it; says whether it only listens.
+    pub(super) fn open_or_listen(&self) -> Result<(Port, bool), InputError> {
+        let name = match &self.port {
+            Some(name) => name.clone(),
+            None => usb::only_probe()?,
+        };
+        match Serial::open(&name) {
+            Ok(serial) => Ok((Port { serial: Box::new(serial), client: Client::new() }, false)),
+            Err(error) => match Listener::to(&name) {
+                Some(listener) => Ok((Port { serial: Box::new(listener), client: Client::new() }, true)),
+                None => Err(error),
+            },
+        }
     }
 }
 
@@ -49,7 +65,7 @@ impl Port {
         procedure: &mut P,
         each: impl FnMut(&mut P),
     ) -> Result<P::Outcome, InputError> {
-        perform(&mut self.serial, &mut self.client, procedure, |note| eprintln!("rig: {note}"), each)
+        perform(self.serial.as_mut(), &mut self.client, procedure, |note| eprintln!("rig: {note}"), each)
     }
 
     /// The same without a word on stderr: the procedure shows its notes itself.
@@ -58,12 +74,12 @@ impl Port {
         procedure: &mut P,
         each: impl FnMut(&mut P),
     ) -> Result<P::Outcome, InputError> {
-        perform(&mut self.serial, &mut self.client, procedure, |_| {}, each)
+        perform(self.serial.as_mut(), &mut self.client, procedure, |_| {}, each)
     }
 
     /// The port alone, for what keeps its own time.
     pub(super) fn transport(&mut self) -> &mut dyn Transport {
-        &mut self.serial
+        self.serial.as_mut()
     }
 
     /// The port's name.

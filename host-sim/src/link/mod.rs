@@ -12,6 +12,7 @@
 //! | [`model_upload`] | a model file for the observer |
 //! | [`words`] | what the rig says, in words |
 //! | [`serial`] | the serial port |
+//! | [`share`] | what comes in, for whoever looks on |
 //! | [`usb`] | the port of the debug probe, by its USB id |
 
 pub mod ask;
@@ -23,5 +24,6 @@ pub mod record;
 pub mod rows;
 pub mod run_experiment;
 pub mod serial;
+pub mod share;
 pub mod usb;
 pub mod words;

@@ -10,6 +10,8 @@ use super::rows::Scale;
 use super::words;
 use crate::input_error::{InputError, Kind};
 
+/// Control ticks a second, where nobody can be asked: it belongs to the board.
+const TICK_HZ: u32 = 10_000;
 const M1_COUNTS_KEY: u16 = 160;
 const M2_COUNTS_KEY: u16 = 170;
 
@@ -36,6 +38,8 @@ pub struct Record {
     every_ticks: u16,
     ticks: u64,
     keep_rows: bool,
+    /// Only listens: another command holds the port.
+    listens: bool,
     ask: Ask,
     recorded: Option<Recorded>,
     /// Telemetry was switched off again.
@@ -61,12 +65,34 @@ impl Record {
             every_ticks,
             ticks: (duration_s * 1e4) as u64,
             keep_rows,
+            listens: false,
             ask: Ask::new(commands),
             recorded: None,
             ending: false,
             done: false,
             heard_s: 0.0,
             notes: Vec::new(),
+        }
+    }
+
+    /// Records what another command has ordered, without a word to the rig, until it is ended.
+    #[must_use]
+    pub fn listening() -> Self {
+        let scale = Scale { tick_hz: TICK_HZ, m1_counts_per_rev: 0, m2_counts_per_rev: 0 };
+        let recorded = Recorded {
+            hello: Hello::default(),
+            scale,
+            crash_record: None,
+            rows: Vec::new(),
+            events: Vec::new(),
+            health: None,
+        };
+        Self {
+            ticks: u64::MAX,
+            listens: true,
+            ask: Ask::new([]),
+            recorded: Some(recorded),
+            ..Self::new(1, 0.0, true)
         }
     }
 
@@ -83,6 +109,10 @@ impl Record {
 
     /// Ends the recording now.
     pub fn finish_early(&mut self) {
+        if self.listens {
+            self.done = true;
+            return;
+        }
         if self.recorded.is_none() {
             self.ask.forget_waiting();
         }
@@ -165,7 +195,8 @@ impl Procedure for Record {
         for message in self.ask.take_others() {
             self.take(message, now_s);
         }
-        if self.recorded.is_some() && !self.ending && now_s - self.heard_s > 2.0 {
+        // Whoever holds the port may have no telemetry on.
+        if self.recorded.is_some() && !self.ending && !self.listens && now_s - self.heard_s > 2.0 {
             return Err(InputError::new("the rig has gone silent").of_kind(Kind::Rig));
         }
         Ok(())

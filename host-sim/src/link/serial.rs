@@ -7,6 +7,7 @@ use std::time::Duration;
 use serial2::SerialPort;
 
 use super::procedure::Transport;
+use super::share::Broadcast;
 use crate::input_error::{InputError, Kind};
 
 /// Longest wait for bytes: how coarse the procedures' time is.
@@ -19,6 +20,7 @@ const SEND_WAIT: Duration = Duration::from_secs(1);
 pub struct Serial {
     name: String,
     port: SerialPort,
+    others: Broadcast,
 }
 
 impl Serial {
@@ -52,7 +54,7 @@ impl Serial {
                 .of_kind(Kind::Rig)
                 .allowed("one at a time"));
         }
-        Ok(Self { name: name.to_owned(), port })
+        Ok(Self { name: name.to_owned(), port, others: Broadcast::of(name) })
     }
 }
 
@@ -88,7 +90,11 @@ impl Transport for Serial {
         match self.port.read(&mut buffer) {
             // A port that was unplugged is at its end at once.
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
-            Ok(count) => bytes.extend_from_slice(buffer.get(..count).unwrap_or_default()),
+            Ok(count) => {
+                let new = buffer.get(..count).unwrap_or_default();
+                self.others.pass(new);
+                bytes.extend_from_slice(new);
+            }
             Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }

@@ -5,6 +5,7 @@ mod plain;
 mod screen;
 
 use std::io::IsTerminal;
+use std::time::{Duration, Instant};
 
 use super::interrupt;
 use super::port::{Port, PortArgs};
@@ -26,7 +27,9 @@ On a terminal: forces, speed, torques and what the observer leaves of the fricti
 seconds; mode, fault and limits in words; load of the control loop, rows and frames that were lost. Keys: q ends
 it, + and - change the time shown, the space bar holds the picture. NO_COLOR is respected.
 With --plain, or where the output is no terminal: a line twice a second, and a line for each event.
-Commands nothing, and does not keep a run alive whose host is gone.")]
+While another command holds the port, it shows what that command receives (Linux), at that command's rate.
+Commands nothing, and does not keep a run alive whose host is gone: it then takes the port over and shows why the rig
+stopped.")]
 pub(super) struct Monitor {
     #[command(flatten)]
     port: PortArgs,
@@ -41,6 +44,12 @@ pub(super) struct Monitor {
     seconds: f64,
 }
 
+/// How long a port may take to be free once the command that held it is gone.
+const TAKE_OVER: Duration = Duration::from_secs(2);
+
+/// What is done after each step.
+type Each<'a> = &'a mut dyn FnMut(&mut Watching);
+
 /// A recording that keeps the last rows only.
 pub(super) struct Watching {
     record: Record,
@@ -48,8 +57,16 @@ pub(super) struct Watching {
 }
 
 impl Watching {
-    fn new(every_ticks: u16, seconds: f64, span_s: f64) -> Self {
-        Self { record: Record::new(every_ticks, seconds, true), history: History::new(span_s) }
+    fn new(span_s: f64) -> Self {
+        Self { record: Record::listening(), history: History::new(span_s) }
+    }
+
+    /// Begins with a port: asks the rig for telemetry, or listens to the command that holds the port.
+    fn begin(&mut self, listens: bool, every_ticks: u16, seconds: f64) {
+        self.record = if listens { Record::listening() } else { Record::new(every_ticks, seconds, true) };
+        if listens {
+            self.history.note("another command holds the port: what it receives is shown".into());
+        }
     }
 }
 
@@ -88,27 +105,63 @@ impl Monitor {
             return Err(error.allowed("0.5 to 3600, in seconds"));
         }
         interrupt::count_signals();
-        let mut port = self.port.open()?;
         if self.plain || !std::io::stdout().is_terminal() {
-            return plain::watch(&mut port, self.seconds);
+            return plain::watch(&self);
         }
-        self.on_screen(&mut port)
-    }
-
-    fn on_screen(&self, port: &mut Port) -> Result<(), InputError> {
-        let mut watching = Watching::new(screen::EVERY_TICKS, self.seconds, self.span);
+        let (port, listens) = self.port.open_or_listen()?;
         let mut screen = Screen::open(&port.name())?;
-        let done = port.perform_quietly(&mut watching, |watching| {
-            let ended = screen.look(&mut watching.history) || interrupt::count() > 0;
-            if ended {
+        let mut watching = Watching::new(self.span);
+        let quietly =
+            |port: &mut Port, watching: &mut Watching, each: Each<'_>| port.perform_quietly(watching, each);
+        let done = self.watch(port, listens, &mut watching, screen::EVERY_TICKS, quietly, |watching| {
+            if screen.look(&mut watching.history) || interrupt::count() > 0 {
                 watching.record.finish_early();
             }
         });
         drop(screen);
-        match done {
-            // Ended before the rig had answered: nobody minds.
-            Err(_) if interrupt::count() > 0 => Ok(()),
-            done => done.map(|_| ()),
+        done
+    }
+
+    /// Watches to the end. Where the command that holds the port goes, the port is taken over.
+    fn watch(
+        &self,
+        mut port: Port,
+        mut listens: bool,
+        watching: &mut Watching,
+        every_ticks: u16,
+        perform: impl Fn(&mut Port, &mut Watching, Each<'_>) -> Result<Recorded, InputError>,
+        mut each: impl FnMut(&mut Watching),
+    ) -> Result<(), InputError> {
+        let begun = Instant::now();
+        loop {
+            watching.begin(listens, every_ticks, self.seconds);
+            let mut ended = false;
+            let done = perform(&mut port, watching, &mut |watching| {
+                each(watching);
+                let over = listens && begun.elapsed().as_secs_f64() > self.seconds;
+                ended |= over || interrupt::count() > 0;
+                if over {
+                    watching.record.finish_early();
+                }
+            });
+            match done {
+                Ok(_) => return Ok(()),
+                // Ended before the rig had answered: nobody minds.
+                Err(_) if ended => return Ok(()),
+                Err(error) if !listens => return Err(error),
+                // The holder is gone, or on its way.
+                Err(_) => (port, listens) = self.take_over()?,
+            }
+        }
+    }
+
+    fn take_over(&self) -> Result<(Port, bool), InputError> {
+        let begun = Instant::now();
+        loop {
+            match self.port.open_or_listen() {
+                Err(_) if begun.elapsed() < TAKE_OVER => std::thread::sleep(TAKE_OVER / 50),
+                opened => return opened,
+            }
         }
     }
 }

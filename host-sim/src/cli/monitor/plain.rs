@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use rig_link::telemetry::{Health, TelemetryRow};
 
-use super::Watching;
+use super::{Each, Monitor, Watching};
 use crate::cli::common::say;
 use crate::cli::interrupt;
 use crate::cli::port::Port;
@@ -15,10 +15,12 @@ const EVERY: Duration = Duration::from_millis(500);
 /// 20 rows a second.
 const EVERY_TICKS: u16 = 500;
 
-pub(super) fn watch(port: &mut Port, seconds: f64) -> Result<(), InputError> {
-    let mut watching = Watching::new(EVERY_TICKS, seconds, 1.0);
+pub(super) fn watch(monitor: &Monitor) -> Result<(), InputError> {
+    let (port, listens) = monitor.port.open_or_listen()?;
+    let mut watching = Watching::new(1.0);
     let mut printed = Instant::now();
-    let done = port.perform_with(&mut watching, |watching| {
+    let aloud = |port: &mut Port, watching: &mut Watching, each: Each<'_>| port.perform_with(watching, each);
+    monitor.watch(port, listens, &mut watching, EVERY_TICKS, aloud, |watching| {
         if interrupt::count() > 0 {
             watching.record.finish_early();
         }
@@ -28,11 +30,7 @@ pub(super) fn watch(port: &mut Port, seconds: f64) -> Result<(), InputError> {
             say(&line(row, watching.history.health.as_ref()));
             printed = Instant::now();
         }
-    });
-    match done {
-        Err(_) if interrupt::count() > 0 => Ok(()),
-        done => done.map(|_| ()),
-    }
+    })
 }
 
 fn line(row: &TelemetryRow, health: Option<&Health>) -> String {
