@@ -5,8 +5,10 @@
 //! one fails; the table at the end says how each ended. What this machine lacks is fetched where that
 //! is possible, and named with the command that would get it where it is not.
 //!
-//! `cargo verify firmware bench` runs only these parts; the parts are host, policy, firmware, bench.
+//! `cargo verify firmware bench` runs only these parts; the parts are host, policy, firmware, bench. `cargo verify layout`
+//! draws the project's floors from the source (`layout.rs`).
 
+mod layout;
 mod size;
 mod step;
 
@@ -26,6 +28,18 @@ const PARTS: [&str; 4] = ["host", "policy", "firmware", "bench"];
 
 fn main() -> ExitCode {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
+    if wanted == ["layout"] {
+        return match layout::write(&root()) {
+            Ok(wrote) => {
+                println!("{wrote}");
+                ExitCode::SUCCESS
+            }
+            Err(error) => {
+                eprintln!("verify: {error}");
+                ExitCode::FAILURE
+            }
+        };
+    }
     if let Some(unknown) = wanted.iter().find(|part| !PARTS.contains(&part.as_str())) {
         eprintln!("verify: {unknown}: no such part; allowed: {}", PARTS.join(", "));
         return ExitCode::from(2);
