@@ -8,6 +8,7 @@ mod cost;
 mod defmt;
 mod faults;
 mod figures;
+mod interrupted;
 mod runs;
 mod serve;
 mod silicon;

@@ -49,7 +49,13 @@ impl Board {
         Self { bench, lines, link }
     }
 
-    fn perform<P: Procedure>(
+    /// The rest of its log, for somebody else to read.
+    pub(super) fn take_lines(&mut self) -> BufReader<std::process::ChildStdout> {
+        let nothing = Command::new("true").stdout(Stdio::piped()).spawn().unwrap().stdout.take().unwrap();
+        std::mem::replace(&mut self.lines, BufReader::new(nothing))
+    }
+
+    pub(super) fn perform<P: Procedure>(
         &self,
         procedure: &mut P,
         each: impl FnMut(&mut P),
