@@ -8,7 +8,7 @@ const STILL_TURNS: f64 = 1e-3;
 
 pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
     let advice =
-        "a drive gives torque though zero is asked for: its torque reference is open, or its offset is large";
+        "a drive gives torque at a setpoint of zero: its torque reference is open, or its offset is large";
     c.arm(advice)?;
     let before = c.rig.row;
     let readings = c.rig.readings(SPAN_S)?;

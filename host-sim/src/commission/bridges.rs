@@ -28,7 +28,7 @@ const BRIDGES: [Bridge; 2] = [
         name: "friction bridge",
         setting: "friction_bridge",
         unit: "N m",
-        x: "Known torque (N m)",
+        x: "known torque, N m",
         channel: 0,
         hang: "on the torque ring's lever, as the road drags it when the disc turns forward",
     },
@@ -36,7 +36,7 @@ const BRIDGES: [Bridge; 2] = [
         name: "normal force bridge",
         setting: "normal_bridge",
         unit: "N",
-        x: "Known force (N)",
+        x: "known force, N",
         channel: 1,
         hang: "on the frame, as the elements press",
     },
@@ -146,7 +146,7 @@ fn one(
         close || c.options.store,
         &format!("store it: {commands} (or --store)"),
     );
-    c.report.calibrations.push(Calibration { name: name.into(), x: bridge.x, y: "Code", fit });
+    c.report.calibrations.push(Calibration { name: name.into(), x: bridge.x, y: "reading, codes", fit });
     c.settle()
 }
 

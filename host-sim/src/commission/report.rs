@@ -223,7 +223,10 @@ fn chart(calibration: &Calibration) -> Chart {
                 y_title: calibration.y.into(),
                 lines: vec![draw("measured", Role::Measured, &fit.y), draw("line", Role::Reference, &line)],
             },
-            Panel { y_title: "Deviation".into(), lines: vec![draw("deviation", Role::Measured, &residual)] },
+            Panel {
+                y_title: format!("deviation, {}", calibration.y.split(", ").nth(1).unwrap_or_default()),
+                lines: vec![draw("deviation", Role::Measured, &residual)],
+            },
         ],
         plane: true,
         ..Chart::default()

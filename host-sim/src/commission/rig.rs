@@ -149,7 +149,7 @@ impl<'a> Rig<'a> {
     /// Asks one thing.
     pub fn ask(&mut self, command: Command) -> Result<Answer, InputError> {
         // A person waits anyway, and a served bench may be slow.
-        let (wait, name) = (5 * patience(&command), words::command(&command));
+        let (wait, name) = (2 * patience(&command), words::command(&command));
         let id = self.client.request(command);
         let asked = Instant::now();
         loop {

@@ -31,7 +31,7 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
     let mut moved = Vec::new();
     let sign = if drive.reversed { -1.0 } else { 1.0 };
     for level in std::iter::once(&0.0).chain(levels) {
-        c.arm("a drive gives torque though zero is asked for")?;
+        c.arm("a drive gives torque at a setpoint of zero")?;
         #[allow(clippy::cast_possible_truncation)]
         let torque = *level as f32;
         let (m1, m2) = if motor == 0 { (torque, 0.0) } else { (0.0, torque) };
@@ -85,8 +85,8 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
     );
     c.report.calibrations.push(Calibration {
         name: format!("torque of {name}"),
-        x: "Asked for at the converter (N m)",
-        y: "Shown by the drive (N m)",
+        x: "Setpoint at the converter, N m",
+        y: "Torque monitor of the drive, N m",
         fit,
     });
     c.settle()?;

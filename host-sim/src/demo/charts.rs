@@ -92,7 +92,7 @@ fn time_chart(run: &ClosedLoop, windows: Vec<Window>, torque_mode: bool) -> Char
         Panel {
             y_title: "speed of the disc, rpm".into(),
             lines: vec![
-                line("asked for", Role::Reference, run, (0.01, 0.01), |f| {
+                line("setpoint", Role::Reference, run, (0.01, 0.01), |f| {
                     RPM * f64::from(f.record.m2_speed_ref_rad_s)
                 }),
                 line("measured", Role::Measured, run, (0.1, 0.005), |f| {

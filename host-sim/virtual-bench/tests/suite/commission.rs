@@ -102,7 +102,7 @@ fn commission(name: &str, mistake: Option<&str>) -> Commissioned {
     let mut board = Board::alone(name, &more);
     let mut keyboard = board.bench.stdin.take().unwrap();
     let out = std::env::temp_dir().join(format!("rig-commission-{name}-{}", std::process::id()));
-    let patience = if mistake.is_some() { "8" } else { "60" };
+    let patience = if mistake.is_some() { "30" } else { "300" };
     let words = ["rig", "commission", "--port", board.link.to_str().unwrap(), "--by", "A. Fitter"];
     let more = ["--out", out.to_str().unwrap(), "--patience-s", patience, "--clock-tolerance", "100"];
     let mut tool = tool(&[&words[..], &more[..]].concat())
@@ -122,8 +122,8 @@ fn commission(name: &str, mistake: Option<&str>) -> Commissioned {
             std::thread::sleep(Duration::from_millis(150));
         }
         if enters {
-            // The disc takes two seconds of the bench's time, weights come to rest at once.
-            std::thread::sleep(Duration::from_secs(if keys == "t" { 10 } else { 2 }));
+            // Weights come to rest at once.
+            std::thread::sleep(Duration::from_secs(2));
             enter.write_all(b"\n").unwrap();
         }
         asked.push(what.to_owned());
