@@ -14,7 +14,6 @@ fn rig(arguments: &[&str], folder: &Path) -> Output {
 }
 
 #[test]
-#[ignore = "driven with the measured speed, bristles leave 0.33 % on figs. 18-21: the diagnosis does not name the block there yet"]
 fn the_case_study_names_the_block_that_lugre_lacks() {
     let made = demo(|_, _, _| ()).unwrap();
     assert_eq!(made.case_study.diagnosis.verdict, "named", "{}", made.case_study.diagnosis.sentence);
