@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::common::say;
@@ -15,7 +16,9 @@ use crate::report::{Block, Page, Table};
 use crate::studies::bristle_damping::{self, Damped};
 use crate::studies::contenders::rubber_of;
 use crate::studies::readings::{self, Row, SPEEDS_RPM};
-use crate::studies::rivals::{Candidate, Plan, Tournament, all, play};
+use crate::studies::rivals::{
+    Candidate, Plan, Separation, Tournament, all, answer, play, separate, separated,
+};
 
 /// Load of the comparisons, N: that of Figs. 18–21.
 const LOAD_N: f64 = 88.0;
@@ -30,13 +33,14 @@ Example:
   rig rivals --figures-only --out target/rivals
   rig rivals --rubber series --out target/rivals
 
-Prints and writes three tables.
+Prints and writes three tables and an answer.
 Readings: eqs. 17–19 of the paper in every way they can be read, each with its overshoot at 10, 20, 30, 120 rpm.
 Damping: the overshoot of LuGre's force over its bristle damping, in closed loop and at constant speed.
 Tournament: each model plays the rubber in figs. 18–21 and is fitted by every other (18, 20 and 21 fitted, 19 held out); then
 the same with a step of speed, a step of load, and holds of two lengths. A cell is the held-out error over the RMS of
 the force. Below 0.27 %, the noise of the friction channel, two models cannot be told apart by these experiments.
-All data are synthetic; the numbers of the models are assumed.
+For pairs that look alike even then, the experiments of rig design are searched for the one that separates them. The last
+lines say which models figs. 18–21 ask for. All data are synthetic; the numbers of the models are assumed.
 
 Writes report.html and rivals.json.")]
 pub(super) struct Rivals {
@@ -56,6 +60,17 @@ struct Results<'a> {
     models: &'a [String],
     figures: Vec<Cell>,
     all: Vec<Cell>,
+    separations: Vec<Separated<'a>>,
+    answer: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Separated<'a> {
+    truth: &'a str,
+    rival: &'a str,
+    separation: f64,
+    experiment: &'a str,
+    toml: &'a str,
 }
 
 #[derive(Serialize)]
@@ -85,15 +100,10 @@ impl Rivals {
         }
         let plays = |name: &String| self.rubber.is_empty() || self.rubber.contains(name);
         let plan = |c: &Candidate| plays(&c.name).then(|| Plan::figures(&c.typical)).transpose();
-        let figures = candidates.iter().map(plan).collect::<Result<Vec<_>, _>>()?;
+        let figures = candidates.par_iter().map(plan).collect::<Result<Vec<_>, _>>()?;
         let compete = |what: &str, plans: &[Option<Plan>], before: Option<&Tournament>| {
             let bar = Mutex::new(Progress::new(what, 1));
-            play(&candidates, plans, before, |done, total| {
-                if let Ok(mut bar) = bar.lock() {
-                    bar.of(total as u64);
-                    bar.set(done as u64);
-                }
-            })
+            play(&candidates, plans, before, |done, total| advance(&bar, done, total))
         };
         let first = compete("figs. 18–21", &figures, None)?;
         let second = if self.figures_only {
@@ -102,6 +112,11 @@ impl Rivals {
             let plans: Vec<_> = figures.iter().map(|plan| plan.as_ref().map(Plan::and_more)).collect();
             Some(compete("steps and holds too", &plans, Some(&first))?)
         };
+        let bar = Mutex::new(Progress::new("experiments that separate", 1));
+        let last = second.as_ref().unwrap_or(&first);
+        let separations = separate(&candidates, last, NOISE, |done, total| advance(&bar, done, total))?;
+        drop(bar);
+        let answer = answer(&candidates, &first, second.as_ref(), &separations, NOISE);
         let mut blocks = vec![
             Block::Heading("Eqs. 17–19, read in every way".into()),
             Block::Text("Overshoot of the deflection at constant speed and load, from rest.".into()),
@@ -114,7 +129,6 @@ impl Rivals {
             )),
             Block::Table(damping),
         ];
-        let mut lines = Vec::new();
         for (heading, tournament) in [
             ("Held-out error on fig. 19, fitted to figs. 18, 20 and 21", Some(&first)),
             (
@@ -128,9 +142,18 @@ impl Rivals {
                 "A row is the model that plays the rubber, a column the model fitted; %.".into(),
             ));
             blocks.push(Block::Table(matrix(tournament)));
-            let found = alike(tournament);
-            blocks.push(Block::List(found.clone()));
-            lines.push((heading, found));
+            blocks.push(Block::List(alike(tournament)));
+        }
+        if !separations.is_empty() {
+            blocks.push(Block::Heading("Experiments that tell look-alikes apart".into()));
+            let pair = |s: &Separation| format!("{} and {}", first.names[s.truth], first.names[s.rival]);
+            blocks.push(Block::List(
+                separations.iter().map(|s| separated(&first.names, s, &pair(s))).collect(),
+            ));
+        }
+        if !answer.is_empty() {
+            blocks.push(Block::Heading("Which model figs. 18–21 ask for".into()));
+            blocks.push(Block::List(answer.clone()));
         }
         for block in &blocks {
             match block {
@@ -147,6 +170,17 @@ impl Rivals {
                 models: &first.names,
                 figures: cells(&first),
                 all: second.as_ref().map_or(Vec::new(), cells),
+                separations: separations
+                    .iter()
+                    .map(|s| Separated {
+                        truth: &first.names[s.truth],
+                        rival: &first.names[s.rival],
+                        separation: s.separation,
+                        experiment: &s.experiment,
+                        toml: &s.toml,
+                    })
+                    .collect(),
+                answer: &answer,
             },
         )?;
         let page = Page {
@@ -159,6 +193,13 @@ impl Rivals {
         output.finish()?;
         say(&format!("\nreport: {}", report.display()));
         Ok(())
+    }
+}
+
+fn advance(bar: &Mutex<Progress>, done: usize, total: usize) {
+    if let Ok(mut bar) = bar.lock() {
+        bar.of(total as u64);
+        bar.set(done as u64);
     }
 }
 

@@ -46,6 +46,8 @@ impl Effort {
     /// About twenty, for a search at the end of other work: at a third of the time, without light loads and slow
     /// turns but where a level of the best is moved there.
     pub const QUICK: Self = Self { loads: &[1.0], speeds_rpm: &[40.0, 120.0], rounds: 1 };
+    /// One of each family, for many pairs of models.
+    pub const BRIEF: Self = Self { loads: &[1.0], speeds_rpm: &[40.0], rounds: 0 };
 }
 
 /// A pair of models and how far they are apart.
@@ -190,12 +192,14 @@ fn evaluate(setting: Setting, rig: &RigFile, models: &[ModelFile]) -> Result<Opt
     let inputs = ContactInputs::new(&signals, rig);
     let reaches =
         models.iter().map(|model| Reach::new(model, rig, &inputs)).collect::<Result<Vec<_>, _>>()?;
+    let unrepeatable: Vec<f64> = reaches.iter().map(|reach| reach.unrepeatable(noise_nm)).collect();
     let mut pairs = Vec::new();
     for i in 0..reaches.len() {
         for j in 0..i {
-            let directions = [(i, j), (j, i)].map(|models| Pair {
-                models,
-                separation: reaches[models.1].distance_from(&reaches[models.0].torque_nm, noise_nm),
+            let directions = [(i, j), (j, i)].map(|models| {
+                let distance = reaches[models.1].distance_from(&reaches[models.0].torque_nm, noise_nm);
+                let repeated = distance.powi(2) - unrepeatable[i].powi(2) - unrepeatable[j].powi(2);
+                Pair { models, separation: repeated.max(0.0).sqrt() }
             });
             let [a, b] = directions;
             pairs.push(if a.separation < b.separation { a } else { b });

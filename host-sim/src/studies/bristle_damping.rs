@@ -5,6 +5,8 @@
 //! rubber's stiffness in the bristles, in closed loop, where speed and load are what motors and lever make of
 //! their steps, and at constant speed and load.
 
+use rayon::prelude::*;
+
 use model_core::friction::FrictionParameters;
 use model_core::friction::lugre::LugreParameters;
 use model_core::friction::series::SeriesParameters;
@@ -74,7 +76,8 @@ pub fn sweep(rubber: &SeriesParameters<f64>, normal_force_n: f64) -> Result<Vec<
         }
         Ok(damped)
     };
-    SIGMA1_N_S_PER_M.into_iter().map(Some).chain([None]).map(row).collect()
+    let rows: Vec<Option<f64>> = SIGMA1_N_S_PER_M.into_iter().map(Some).chain([None]).collect();
+    rows.into_par_iter().map(row).collect()
 }
 
 /// A model file with these numbers.

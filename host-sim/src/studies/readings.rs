@@ -10,6 +10,8 @@
 
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
+
 use model_core::friction::stribeck::{Stribeck, StribeckParameters};
 
 /// Speeds of the disc in Figs. 18–21, rpm.
@@ -180,7 +182,7 @@ pub fn table(curve: &StribeckParameters<f64>, stiffness_n_per_m: f64, normal_for
         figures: std::array::from_fn(|k| cases[k].seen(reading)),
         steep: steep.seen(reading),
     };
-    readings.into_iter().map(row).collect()
+    readings.into_par_iter().map(row).collect()
 }
 
 impl Reading {

@@ -29,7 +29,12 @@ impl Candidate {
         }
         if has("c_u_n_s_per_m") {
             let now = typical.get("c_u_n_s_per_m").unwrap_or(1.0);
-            other_starts.push(vec![("c_u_n_s_per_m", if now < 50.0 { 150.0 } else { 20.0 })]);
+            let damped = ("c_u_n_s_per_m", if now < 50.0 { 150.0 } else { 20.0 });
+            other_starts.push(vec![damped]);
+            // A block that relaxes contains the one that does not, with hardly any branch.
+            let branch =
+                [("k_1_n_per_m", 1e3), ("branch_ratio", 0.01)].into_iter().find(|(name, _)| has(name));
+            other_starts.extend(branch.map(|weak| vec![damped, weak]));
         }
         Self { name: kind.name().into(), typical, free, other_starts }
     }

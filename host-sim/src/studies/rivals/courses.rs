@@ -16,6 +16,10 @@ use model_core::friction::{Contact, FrictionModel, FrictionParameters};
 const WINDOW_S: (f64, f64) = (3.48, 4.18);
 /// Control periods from one compared force to the next.
 const EVERY: usize = 10;
+/// Control periods that a search takes at once where the motion is calm; a divisor of [`EVERY`].
+pub(super) const AT_ONCE: usize = 5;
+/// Calm is what changes by less than these parts, and these m/s and N, from one compared force to the next.
+const CALM: [(f64, f64); 2] = [(2e-3, 1e-4), (2e-3, 0.05)];
 
 /// Mean sliding speed and final normal force of each step.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +28,8 @@ pub struct Course {
     pub name: String,
     /// m/s, N.
     pub steps: Vec<(f64, f64)>,
+    /// Whether the steps up to each compared force are calm.
+    calm: Vec<bool>,
 }
 
 /// Courses to fit and to predict.
@@ -36,6 +42,19 @@ pub struct Plan {
 }
 
 impl Course {
+    fn new(name: &str, steps: Vec<(f64, f64)>) -> Self {
+        let spread = |chunk: &[(f64, f64)], pick: fn(&(f64, f64)) -> f64, (part, least): (f64, f64)| {
+            let (low, high) = chunk
+                .iter()
+                .map(pick)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            high - low <= part * low.abs().min(high.abs()) + least
+        };
+        let calm = steps.chunks_exact(EVERY);
+        let calm = calm.map(|chunk| spread(chunk, |s| s.0, CALM[0]) && spread(chunk, |s| s.1, CALM[1]));
+        Self { name: name.into(), calm: calm.collect(), steps }
+    }
+
     /// Piecewise straight speed and load through (time s, speed m/s, load N).
     fn through(name: &str, points: &[(f64, f64, f64)]) -> Self {
         let end_s = points.last().map_or(0.0, |p| p.0);
@@ -49,7 +68,7 @@ impl Course {
             let t = k as f64 * PERIOD_S;
             (at(t + 0.5 * PERIOD_S).0, at(t + PERIOD_S).1)
         });
-        Self { name: name.into(), steps: steps.collect() }
+        Self::new(name, steps.collect())
     }
 
     fn speed_step(name: &str, slow: f64, fast: f64, load_n: f64) -> Self {
@@ -108,7 +127,7 @@ impl Course {
             .map(|(_, f)| (f.truth.disc_speed_rad_s * rig.friction_radius_m, f.truth.normal_force_n))
             .collect();
         let steps = truth.windows(2).map(|w| (0.5 * (w[0].0 + w[1].0), w[1].1)).collect();
-        Ok(Self { name: figure.into(), steps })
+        Ok(Self::new(figure, steps))
     }
 
     /// Force of a model, from rest, once a millisecond.
@@ -123,6 +142,25 @@ impl Course {
             }
         }
         forces
+    }
+
+    /// The same with [`AT_ONCE`] steps at a time where the motion is calm, by the model prepared for so long a step: good
+    /// enough for a derivative, in a third of the time.
+    #[must_use]
+    pub fn rough_force_n(&self, model: &FrictionModel<f64>, long: &FrictionModel<f64>) -> Vec<f64> {
+        let mut state = model.rest();
+        let chunks = self.steps.chunks_exact(EVERY).zip(&self.calm);
+        let force = chunks.map(|(chunk, calm)| {
+            let (model, at_once) = if *calm { (long, AT_ONCE) } else { (model, 1) };
+            let mut force_n = 0.0;
+            for steps in chunk.chunks_exact(at_once) {
+                let v = steps.iter().map(|s| s.0).sum::<f64>() / at_once as f64;
+                let n = steps[at_once - 1].1;
+                force_n = model.step(&mut state, &Contact::new(v, n)).force_n;
+            }
+            force_n
+        });
+        force.collect()
     }
 }
 
@@ -154,5 +192,33 @@ impl Plan {
             Course::holds("holds", 0.15, 70.0, [0.05, 0.6]),
         ]);
         plan
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::studies::rivals::all;
+
+    #[test]
+    fn rough_forces_are_close_to_the_fine_ones_in_much_fewer_steps() {
+        for candidate in all() {
+            let courses = [
+                Course::speed_step("speed", 0.05, 0.3, 88.0),
+                Course::load_step("load", 0.1, 40.0, 100.0),
+                Course::holds("holds", 0.1, 88.0, [0.02, 0.3]),
+            ];
+            let fine = candidate.typical.model(PERIOD_S).unwrap();
+            let long = candidate.typical.model(PERIOD_S * AT_ONCE as f64).unwrap();
+            for course in courses {
+                let calm = course.calm.iter().filter(|calm| **calm).count();
+                assert!(calm * 10 > course.calm.len() * 9, "{}: {calm} calm", course.name);
+                let (a, b) = (course.force_n(&fine), course.rough_force_n(&fine, &long));
+                assert_eq!(a.len(), b.len());
+                let error: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
+                let nrmse = (error / a.iter().map(|a| a * a).sum::<f64>()).sqrt();
+                assert!(nrmse < 0.05, "{} on {}: {nrmse}", candidate.name, course.name);
+            }
+        }
     }
 }

@@ -1,12 +1,12 @@
 //! Every candidate fitted to the logs of every other.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
+
+use rayon::prelude::*;
 
 use super::candidates::Candidate;
-use super::courses::{Course, Plan};
-use super::search::fit;
+use super::courses::{AT_ONCE, Course, Plan};
+use super::search::{Accuracy, fit};
 use crate::input_error::InputError;
 use crate::plant::PERIOD_S;
 use model_core::friction::FrictionParameters;
@@ -69,13 +69,20 @@ impl Tournament {
 
 /// Residual that stands for a refusal, in parts of a log's RMS: far worse than any prediction.
 const REFUSED: f64 = 1.0;
+/// Error, over the RMS of a log, with which a search is content: a tenth of the channel's noise.
+const ENOUGH: f64 = 2.7e-4;
 
 /// Forces on each course.
 type Forces = Vec<Vec<f64>>;
 
-fn forces(p: &FrictionParameters<f64>, courses: &[Course]) -> Option<Forces> {
+fn forces(p: &FrictionParameters<f64>, courses: &[Course], accuracy: Accuracy) -> Option<Forces> {
     let model = p.model(PERIOD_S).ok()?;
-    Some(courses.iter().map(|course| course.force_n(&model)).collect())
+    let long = p.model(PERIOD_S * AT_ONCE as f64).ok()?;
+    let force = |course: &Course| match accuracy {
+        Accuracy::Fine => course.force_n(&model),
+        Accuracy::Rough => course.rough_force_n(&model, &long),
+    };
+    Some(courses.iter().map(force).collect())
 }
 
 /// Each log's error over the RMS of its force.
@@ -85,6 +92,14 @@ fn errors(seen: &[Vec<f64>], predicted: &[Vec<f64>]) -> Vec<f64> {
         (square / a.iter().map(|a| a * a).sum::<f64>()).sqrt()
     };
     seen.iter().zip(predicted).map(error).collect()
+}
+
+/// The logs of a truth.
+struct Logs<'a> {
+    truth: usize,
+    plan: &'a Plan,
+    train: Forces,
+    held_out: Forces,
 }
 
 /// Plays the matches of each truth that has a plan, on that plan, from what `before` found where it is given. `progress` is told the matches played of all.
@@ -98,83 +113,62 @@ pub fn play(
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Tournament, InputError> {
     let count = candidates.len();
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let matches = Mutex::new(Vec::new());
-    let truths: Vec<(usize, &Plan, Forces, Forces)> = candidates
-        .iter()
-        .zip(plans)
-        .enumerate()
-        .filter_map(|(place, (truth, plan))| plan.as_ref().map(|plan| (place, truth, plan)))
-        .map(|(place, truth, plan)| {
-            let run = |courses: &[Course]| forces(&truth.typical, courses);
-            let both = run(&plan.train).zip(run(&plan.held_out));
-            both.map(|(train, held_out)| (place, plan, train, held_out)).ok_or_else(|| {
-                InputError::new("a candidate's own numbers are out of range").value(&truth.name)
-            })
-        })
-        .collect::<Result<_, _>>()?;
-    let workers = thread::available_parallelism().map_or(1, |n| n.get());
-    thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                loop {
-                    let turn = next.fetch_add(1, Ordering::Relaxed);
-                    if turn >= truths.len() * count {
-                        break;
-                    }
-                    let fitted = turn % count;
-                    let (truth, plan, train, held_out) = &truths[turn / count];
-                    let truth = *truth;
-                    let known = before.and_then(|t| t.of(truth, fitted)).map(|m| m.parameters);
-                    let played = one(&candidates[fitted], known, plan, train, held_out);
-                    if let (Some((parameters, train_nrmse, held_out_nrmse)), Ok(mut all)) =
-                        (played, matches.lock())
-                    {
-                        all.push(Match { truth, fitted, train_nrmse, held_out_nrmse, parameters });
-                    }
-                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, truths.len() * count);
-                }
-            });
-        }
+    let logs = candidates.iter().zip(plans).enumerate().filter_map(|(truth, (candidate, plan))| {
+        let plan = plan.as_ref()?;
+        let run = |courses: &[Course]| forces(&candidate.typical, courses, Accuracy::Fine);
+        let refused = || InputError::new("a candidate's own numbers are out of range").value(&candidate.name);
+        let both = run(&plan.train).zip(run(&plan.held_out)).ok_or_else(refused);
+        Some(both.map(|(train, held_out)| Logs { truth, plan, train, held_out }))
     });
-    let mut matches = matches.into_inner().unwrap_or_default();
-    matches.sort_by_key(|m| (m.truth, m.fitted));
+    let logs: Vec<Logs<'_>> = logs.collect::<Result<_, _>>()?;
+    let (done, all) = (AtomicUsize::new(0), logs.len() * count);
+    let one = |turn: usize| {
+        let (logs, fitted) = (&logs[turn / count], turn % count);
+        let known = before.and_then(|t| t.of(logs.truth, fitted)).map(|m| m.parameters);
+        let found = logs.fitted(&candidates[fitted], known);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, all);
+        found.map(|(parameters, train_nrmse, held_out_nrmse)| Match {
+            truth: logs.truth,
+            fitted,
+            train_nrmse,
+            held_out_nrmse,
+            parameters,
+        })
+    };
+    let matches: Vec<Match> = (0..all).into_par_iter().with_max_len(1).filter_map(one).collect();
+    let held_out = plans.iter().flatten().next().map_or(&[][..], |p| &p.held_out);
     Ok(Tournament {
         names: candidates.iter().map(|c| c.name.clone()).collect(),
-        held_out: plans
-            .iter()
-            .flatten()
-            .next()
-            .map_or(Vec::new(), |p| p.held_out.iter().map(|c| c.name.clone()).collect()),
+        held_out: held_out.iter().map(|c| c.name.clone()).collect(),
         matches,
     })
 }
 
-fn one(
-    candidate: &Candidate,
-    known: Option<FrictionParameters<f64>>,
-    plan: &Plan,
-    train: &[Vec<f64>],
-    held_out: &[Vec<f64>],
-) -> Option<(FrictionParameters<f64>, f64, Vec<f64>)> {
-    let scales: Vec<f64> =
-        train.iter().map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9)).collect();
-    let residuals = |p: &FrictionParameters<f64>| {
-        // Numbers that the model refuses (several roots of the modified LuGre model) are no end of the search.
-        let Some(predicted) = forces(p, &plan.train) else {
-            return Some(vec![REFUSED; train.iter().map(Vec::len).sum()]);
+impl Logs<'_> {
+    /// The candidate's best numbers, its error on the logs fitted, and that on each held out.
+    fn fitted(
+        &self,
+        candidate: &Candidate,
+        known: Option<FrictionParameters<f64>>,
+    ) -> Option<(FrictionParameters<f64>, f64, Vec<f64>)> {
+        let norm = |f: &Vec<f64>| f.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+        let scales: Vec<f64> = self.train.iter().map(norm).collect();
+        let residuals = |p: &FrictionParameters<f64>, accuracy: Accuracy| {
+            // Numbers that the model refuses (several roots of the modified LuGre model) are no end of the search.
+            let Some(predicted) = forces(p, &self.plan.train, accuracy) else {
+                return Some(vec![REFUSED; self.train.iter().map(Vec::len).sum()]);
+            };
+            let each = self.train.iter().zip(&predicted).zip(&scales);
+            let each = each.flat_map(|((a, b), scale)| a.iter().zip(b).map(move |(a, b)| (b - a) / scale));
+            Some(each.collect())
         };
-        let each = train.iter().zip(&predicted).zip(&scales);
-        Some(
-            each.flat_map(|((a, b), scale)| a.iter().zip(b).map(move |(a, b)| (b - a) / scale))
-                .collect::<Vec<_>>(),
-        )
-    };
-    let found = fit(candidate, known, &residuals)?;
-    let root_mean_square =
-        |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-    let train_nrmse = root_mean_square(errors(train, &forces(&found, &plan.train)?));
-    Some((found, train_nrmse, errors(held_out, &forces(&found, &plan.held_out)?)))
+        let enough = self.train.len() as f64 * ENOUGH * ENOUGH;
+        let found = fit(candidate, known, enough, &residuals)?;
+        let predicted = |courses: &[Course]| forces(&found, courses, Accuracy::Fine);
+        let train = errors(&self.train, &predicted(&self.plan.train)?);
+        let mean_square = train.iter().map(|e| e * e).sum::<f64>() / train.len() as f64;
+        Some((found, mean_square.sqrt(), errors(&self.held_out, &predicted(&self.plan.held_out)?)))
+    }
 }
 
 #[cfg(test)]
@@ -190,12 +184,10 @@ mod tests {
         let moved =
             Candidate { typical: truth.typical.with("k_u_n_per_m", 3.5e4).with("a1", 0.6), ..truth.clone() };
         let plan = Plan::figures(&truth.typical).unwrap();
-        let run = |courses: &[Course]| forces(&truth.typical, courses).unwrap();
-        let (train, held_out) = (run(&plan.train), run(&plan.held_out));
-        let (own, lugre) = (
-            one(&moved, None, &plan, &train, &held_out).unwrap().2[0],
-            one(&pick("lugre"), None, &plan, &train, &held_out).unwrap().2[0],
-        );
+        let run = |courses: &[Course]| forces(&truth.typical, courses, Accuracy::Fine).unwrap();
+        let logs = Logs { truth: 0, plan: &plan, train: run(&plan.train), held_out: run(&plan.held_out) };
+        let (own, lugre) =
+            (logs.fitted(&moved, None).unwrap().2[0], logs.fitted(&pick("lugre"), None).unwrap().2[0]);
         assert!(own < 1e-3, "the series element on its own log: {own}");
         assert!(lugre > 10.0 * own && lugre > 5e-3, "LuGre: {lugre}");
     }
