@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use model_core::friction::ModelKind;
 use tempfile::TempDir;
 
 const RIG: &str = "[geometry]\nfriction_radius_m = 0.06\n";
@@ -231,11 +232,11 @@ fn an_unknown_key_is_refused_and_the_known_ones_are_listed() {
 
 #[test]
 fn unknown_kinds_and_effects_are_refused_and_the_known_ones_are_listed() {
+    let kinds: Vec<&str> = ModelKind::ALL.iter().map(|kind| kind.name()).collect();
     file_refused(
         "model.toml",
         &MODEL.replace("lugre", "glue"),
-        "model.toml:1: kind = \"glue\": not known; allowed: brush, lugre, modified_lugre, modified_lugre_fold, series, dahl, \
-         elasto_plastic, frictional_lag, maxwell_slip, dieterich, ruina, series_zener, series_maxwell",
+        &format!("model.toml:1: kind = \"glue\": not known; allowed: {}", kinds.join(", ")),
     );
     file_refused(
         "model.toml",
