@@ -207,6 +207,40 @@ fn a_load_step_at_constant_speed_is_remembered_over_a_distance_where_the_model_s
     assert!((after(0.3, 2e-2) - 1.0).abs() < 1e-3);
 }
 
+#[test]
+fn a_contact_that_feels_its_load_late_follows_its_equations() {
+    for length_m in [1e-4, 3e-3] {
+        let p = FrictionParameters::typical(ModelKind::PrakashClifton)
+            .with("sigma0_n_per_m", 1e5)
+            .with("sigma1_n_s_per_m", 10.0)
+            .with("a2_s_per_m", 0.05)
+            .with("memory_length_m", length_m);
+        let equations = move |y: &[f64], v: f64, n: f64| {
+            let felt = (v.abs() + 1e-6) / length_m * (n - y[1]);
+            let rate = v - 1e5 * v.abs() * y[0] / (y[1] * g(&p, v));
+            (vec![rate, felt], 1e5 * y[0] + 10.0 * rate + y[1] * 0.05 * v)
+        };
+        assert_follows(&p, &equations, &[0.0, 60.0], 100);
+    }
+}
+
+#[test]
+fn a_load_step_on_a_contact_that_feels_its_load_late_has_no_jump_and_acts_as_e_to_the_way_slid() {
+    let p = FrictionParameters::<f64>::typical(ModelKind::PrakashClifton);
+    let model = p.model(1e-5).unwrap();
+    let mut state = model.rest();
+    let mut force = |load_n: f64, steps: u32| {
+        (0..steps).map(|_| model.step(&mut state, &Contact::new(0.1, load_n)).force_n).last().unwrap()
+    };
+    let before = force(50.0, 100_000);
+    let at_once = force(100.0, 1);
+    assert!((at_once / before - 1.0).abs() < 3e-3, "{before} {at_once}");
+    // After 1 mm = L in all; the first step's load counts as risen over that step.
+    let after = force(100.0, 999);
+    let expected = before * (2.0 - (-1.0f64).exp());
+    assert!((after / expected - 1.0).abs() < 2e-3, "{after} {expected}");
+}
+
 /// Block with Maxwell branches and bristles: state u, z, and the branches' forces.
 fn branched(
     p: FrictionParameters<f64>,

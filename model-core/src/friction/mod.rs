@@ -14,6 +14,7 @@
 //! | [`elasto_plastic`] | | no: as LuGre, without its drift |
 //! | [`maxwell_slip`] | | no: elements slide where they break loose |
 //! | [`frictional_lag`] | | yes, where the lag is longer than the wind-up |
+//! | [`prakash_clifton`] | | no: as LuGre; a step of the load acts after a distance |
 //! | [`rate_state`] | | yes: by the direct effect and by the strength of a rested contact |
 //!
 //! Equation and figure numbers are those of Božić, Petrović, Matuško (2009). Every model is a value
@@ -31,6 +32,7 @@ pub mod lugre_patch;
 pub mod maxwell_slip;
 pub mod modified_lugre;
 mod parameters;
+pub mod prakash_clifton;
 pub mod rate_state;
 #[macro_use]
 mod registry;
@@ -74,6 +76,8 @@ models! {
     Dieterich, rate_state::Dieterich<T>, rate_state::RateStateState<T>, "dieterich";
     /// Rate-and-state friction with the slip law, under an elastic block.
     Ruina, rate_state::Ruina<T>, rate_state::RateStateState<T>, "ruina";
+    /// LuGre that feels a change of its load over a distance of sliding.
+    PrakashClifton, prakash_clifton::PrakashClifton<T>, prakash_clifton::PrakashCliftonState<T>, "prakash_clifton";
     /// Zener rubber in series with LuGre bristles.
     SeriesZener, series_zener::SeriesZener<T>, series::SeriesState<T, 1>, "series_zener";
     /// Filled rubber, a spectrum of Maxwell branches shifted by temperature, in series with LuGre bristles.
