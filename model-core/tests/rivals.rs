@@ -111,6 +111,52 @@ fn a_lagging_coefficient_follows_its_equations() {
 }
 
 #[test]
+fn a_brush_with_a_curve_follows_its_equations() {
+    let p = FrictionParameters::typical(ModelKind::BrushCurve)
+        .with("static_excess", 0.1)
+        .with("a2_s_per_m", 0.05);
+    let period = 100;
+    let step = PERIOD_S / period as f64;
+    let steps = (DURATION_S / step).round() as usize;
+    let (mut force, mut slips, mut last_v, mut out) = (0.0f64, false, 0.0f64, Vec::new());
+    for k in 0..steps {
+        let ((v, _), (_, n)) = (motion((k as f64 + 0.5) * step), motion((k as f64 + 1.0) * step));
+        slips &= v * last_v > 0.0;
+        last_v = v;
+        if !slips {
+            force += 3e4 * v * step;
+            slips = force.abs() >= 1.3 * n;
+        }
+        if slips {
+            force = (n * (g(&p, v) + 0.05 * v.abs())).copysign(v);
+        }
+        if (k + 1) % period == 0 {
+            out.push(force);
+        }
+    }
+    let seen = stepped(&p);
+    let error: f64 = out.iter().zip(&seen).map(|(a, b)| (a - b).powi(2)).sum();
+    let nrmse = (error / out.iter().map(|a| a * a).sum::<f64>()).sqrt();
+    println!("brush_curve: NRMSE {nrmse:.1e}");
+    assert!(nrmse < 1e-3, "{nrmse}");
+}
+
+#[test]
+fn a_brush_with_a_curve_drops_more_the_faster_it_slides() {
+    let model = FrictionParameters::<f64>::typical(ModelKind::BrushCurve).model(1e-5).unwrap();
+    let drop = |v: f64| {
+        let mut state = model.rest();
+        let force: Vec<f64> =
+            (0..200_000).map(|_| model.step(&mut state, &Contact::new(v, 88.0)).force_n).collect();
+        force.iter().copied().fold(0.0, f64::max) / force[199_999] - 1.0
+    };
+    for v in [0.06, 0.75] {
+        let expected = 1.2 / (0.5 + 0.7 * (-(v / 0.5f64).sqrt()).exp()) - 1.0;
+        assert!((drop(v) - expected).abs() < 0.01, "{v} m/s: {} {expected}", drop(v));
+    }
+}
+
+#[test]
 fn maxwell_slip_follows_its_equations() {
     let p = FrictionParameters::typical(ModelKind::MaxwellSlip);
     let period = 100;

@@ -3,6 +3,7 @@
 //! | model | equations | overshoots at constant sliding speed and normal force? |
 //! |---|---|---|
 //! | [`brush`] | 4–6 | a drop by µ_s/µ_c − 1, as a discontinuity |
+//! | [`brush_curve`] | 4–6 | the same, with µ_c falling with speed as eqs. 4 and 10 have it |
 //! | [`brush_patch`] | 7–11 | each element as above; the sum over the patch hardly |
 //! | [`lugre`] | 12–14 | no: the bristle deflection rises monotonically |
 //! | [`lugre_patch`] | 15–16 | no |
@@ -21,6 +22,7 @@
 //! prepared once from validated parameters, and a pure `step(&self, &mut state, &contact)`.
 
 pub mod brush;
+pub mod brush_curve;
 pub mod brush_patch;
 mod contact;
 pub mod dahl;
@@ -56,6 +58,8 @@ use stribeck::Stribeck;
 models! {
     /// Brush with reset.
     Brush, brush::Brush<T>, brush::BrushState<T>, "brush";
+    /// Brush with reset whose sliding coefficient follows a curve.
+    BrushCurve, brush_curve::BrushCurve<T>, brush::BrushState<T>, "brush_curve";
     /// LuGre.
     Lugre, lugre::Lugre<T>, lugre::LugreState<T>, "lugre";
     /// Modified LuGre as printed.
