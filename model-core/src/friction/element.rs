@@ -115,6 +115,60 @@ pub trait Element<T: Real>: Copy + Debug + PartialEq {
     }
 }
 
+/// What a model has from a part of it that is a model, too: the curve, and the stiffness while it sticks.
+macro_rules! curve_and_stiffness_of {
+    ($part:tt) => {
+        fn largest_coefficient(&self) -> T {
+            Element::largest_coefficient(&self.$part)
+        }
+
+        fn sticking_stiffness_n_per_m(&self, load_n: T) -> T {
+            Element::sticking_stiffness_n_per_m(&self.$part, load_n)
+        }
+
+        fn stribeck(&self) -> Option<&Stribeck<T>> {
+            Element::stribeck(&self.$part)
+        }
+    };
+}
+
+/// All that a model does once it is built, where it is another one with other parameters.
+macro_rules! does_what {
+    ($part:tt does, with $state:ty) => {
+        fn rest(&self) -> $state {
+            Element::rest(&self.$part)
+        }
+
+        fn holding(&self, force_n: T, contact: &Contact<T>) -> $state {
+            Element::holding(&self.$part, force_n, contact)
+        }
+
+        fn set_step_s(&mut self, step_s: T) {
+            Element::set_step_s(&mut self.$part, step_s);
+        }
+
+        fn step(&self, state: &mut $state, contact: &Contact<T>) -> FrictionForce<T> {
+            Element::step(&self.$part, state, contact)
+        }
+
+        fn deformation_m(state: &$state) -> T {
+            state.deformation_m()
+        }
+
+        fn block_time_s(&self) -> Option<T> {
+            Element::block_time_s(&self.$part)
+        }
+
+        fn winding_reach_m(&self, load_n: T) -> Option<T> {
+            Element::winding_reach_m(&self.$part, load_n)
+        }
+
+        $crate::friction::element::curve_and_stiffness_of!($part);
+    };
+}
+
+pub(super) use {curve_and_stiffness_of, does_what};
+
 /// The values as many as there are parameters.
 pub(super) fn exactly<T: Real, const N: usize>(values: &[T]) -> Result<[T; N], ParameterError> {
     values.try_into().map_err(|_| ParameterError {

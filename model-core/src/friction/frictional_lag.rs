@@ -11,7 +11,7 @@
 //! **Step**: µ exact for a held speed; z exact for the mean of µ over the step: second order.
 
 use super::contact::{Contact, FrictionForce};
-use super::element::{Element, ParameterSpec};
+use super::element::{Element, ParameterSpec, curve_and_stiffness_of};
 use super::lugre::{Lugre, LugreState, and_bristles, bristles_and};
 use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
@@ -94,15 +94,5 @@ impl<T: Real> Element<T> for FrictionalLag<T> {
         state.deflection_m
     }
 
-    fn largest_coefficient(&self) -> T {
-        self.bristles.stribeck.largest()
-    }
-
-    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
-        self.bristles.sigma0
-    }
-
-    fn stribeck(&self) -> Option<&Stribeck<T>> {
-        Some(&self.bristles.stribeck)
-    }
+    curve_and_stiffness_of!(bristles);
 }

@@ -25,8 +25,8 @@
 
 use super::FrictionModel;
 use super::contact::{Contact, FrictionForce};
-use super::element::{Element, ParameterSpec};
-use super::lugre::{self, LugreParameters, require_step};
+use super::element::{Element, ParameterSpec, curve_and_stiffness_of, does_what};
+use super::lugre::{self, Lugre, LugreParameters, LugreState};
 use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -46,12 +46,7 @@ pub enum Scheme {
 /// Modified LuGre model, prepared for a step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModifiedLugre<T> {
-    stribeck: Stribeck<T>,
-    sigma0: T,
-    pub(crate) inverse_sigma0: T,
-    sigma1: T,
-    a2: T,
-    step_s: T,
+    bristles: Lugre<T>,
     inverse_step: T,
     scheme: Scheme,
     several_roots: bool,
@@ -85,20 +80,9 @@ impl<T: Real> ModifiedLugre<T> {
 
     /// As [`Self::new`] with parameters that may allow several roots.
     fn any(p: &LugreParameters<T>, step_s: T) -> Result<Self, ParameterError> {
-        let lugre = lugre::Lugre::new(p, step_s)?;
-        let mut model = Self {
-            stribeck: lugre.stribeck,
-            sigma0: lugre.sigma0,
-            inverse_sigma0: lugre.inverse_sigma0,
-            sigma1: lugre.sigma1,
-            a2: lugre.a2,
-            step_s,
-            inverse_step: T::ONE,
-            scheme: Scheme::Implicit,
-            several_roots: !lugre.stribeck.momentum_rises(),
-        };
-        model.set_step_s(require_step(step_s)?);
-        Ok(model)
+        let bristles = Lugre::new(p, step_s)?;
+        let several_roots = !bristles.stribeck.momentum_rises();
+        Ok(Self { bristles, inverse_step: T::ONE / step_s, scheme: Scheme::Implicit, several_roots })
     }
 
     /// The same model with another treatment of the implicit equation.
@@ -110,18 +94,18 @@ impl<T: Real> ModifiedLugre<T> {
     /// Changes the step size, s, for unevenly sampled inputs. The caller keeps it positive.
     #[inline]
     pub fn set_step_s(&mut self, step_s: T) {
-        self.step_s = step_s;
+        self.bristles.set_step_s(step_s);
         self.inverse_step = T::ONE / step_s;
     }
 
     /// Largest deflection that the load allows, m.
     pub fn largest_deflection_m(&self, normal_force_n: T) -> T {
-        normal_force_n.at_least(T::ZERO) * self.stribeck.largest() * self.inverse_sigma0
+        self.bristles.largest_deflection_m(normal_force_n)
     }
 
     /// The curve of steady sliding.
     pub fn stribeck(&self) -> &Stribeck<T> {
-        &self.stribeck
+        self.bristles.stribeck()
     }
 
     /// Advances the deflection by one step and returns the friction force.
@@ -148,13 +132,13 @@ impl<T: Real> ModifiedLugre<T> {
         }
         let u = state.deflection_m;
         let carried = u - courant * (u - upstream_m);
-        let gain = self.sigma0 * v.abs() / load;
+        let gain = self.bristles.sigma0 * v.abs() / load;
         let mut tip_speed_m_s = v - state.rate_m_s;
         let next = match self.scheme {
             // u⁺ = carried + Δt (v − s),  s g(s) = gain u⁺
             Scheme::Implicit => {
-                let free = carried + self.step_s * v;
-                let held = gain * self.step_s;
+                let free = carried + self.bristles.step_s * v;
+                let held = gain * self.bristles.step_s;
                 let s = if self.several_roots {
                     self.root_on_branch(state.tip_speed_m_s, gain * free, held)
                 } else {
@@ -162,24 +146,28 @@ impl<T: Real> ModifiedLugre<T> {
                 };
                 tip_speed_m_s = s;
                 // Two forms of the same number; each is free of cancellation where it is used.
-                if held > T::ONE { s * self.stribeck.coefficient(s) / gain } else { free - self.step_s * s }
+                if held > T::ONE {
+                    s * self.bristles.stribeck.coefficient(s) / gain
+                } else {
+                    free - self.bristles.step_s * s
+                }
             }
             // u⁺ = u + Δt (v − s),  (s − w) g(s) = gain u⁺,  w = rω ∂u/∂x
             Scheme::Literal => {
-                let (free, held) = (u + self.step_s * v, gain * self.step_s);
+                let (free, held) = (u + self.bristles.step_s * v, gain * self.bristles.step_s);
                 let s = self.shifted_root(gain * free, held, (u - carried) * self.inverse_step);
                 tip_speed_m_s = s;
-                free - self.step_s * s
+                free - self.bristles.step_s * s
             }
             Scheme::Lagged => {
-                let g = self.stribeck.coefficient(v - state.rate_m_s);
-                carried + self.step_s * (v - gain * u / g)
+                let g = self.bristles.stribeck.coefficient(v - state.rate_m_s);
+                carried + self.bristles.step_s * (v - gain * u / g)
             }
         };
         let rate = (next - u) * self.inverse_step;
         *state = ModifiedLugreState { deflection_m: next, rate_m_s: rate, tip_speed_m_s };
         FrictionForce {
-            force_n: self.sigma0 * next + self.sigma1 * rate + load * self.a2 * v,
+            force_n: self.bristles.sigma0 * next + self.bristles.sigma1 * rate + load * self.bristles.a2 * v,
             tip_speed_m_s: v - rate,
         }
     }
@@ -191,11 +179,11 @@ impl<T: Real> ModifiedLugre<T> {
         if size == T::ZERO {
             return T::ZERO;
         }
-        let mut low = size / (self.stribeck.largest() + b);
-        let mut high = size / (self.stribeck.smallest() + b);
+        let mut low = size / (self.bristles.stribeck.largest() + b);
+        let mut high = size / (self.bristles.stribeck.smallest() + b);
         let mut s = low;
         for _ in 0..MOST_ITERATIONS {
-            let (g, slope) = self.stribeck.coefficient_and_slope(s);
+            let (g, slope) = self.bristles.stribeck.coefficient_and_slope(s);
             let value = s * (g + b) - size;
             if value > T::ZERO {
                 high = s;
@@ -216,11 +204,11 @@ impl<T: Real> ModifiedLugre<T> {
     /// The root of (s − w) g(s) + b s = r; the left side rises strictly where s g(s) does and s is beyond w.
     fn shifted_root(&self, r: T, b: T, w: T) -> T {
         let end = |g: T| (r + w * g) / (g + b);
-        let (one, other) = (end(self.stribeck.largest()), end(self.stribeck.smallest()));
+        let (one, other) = (end(self.bristles.stribeck.largest()), end(self.bristles.stribeck.smallest()));
         let (mut low, mut high) = (one.at_most(other), one.at_least(other));
         let mut s = T::HALF * (low + high);
         for _ in 0..MOST_ITERATIONS {
-            let (g, _) = self.stribeck.coefficient_and_slope(s);
+            let (g, _) = self.bristles.stribeck.coefficient_and_slope(s);
             // g changes slowly beside s: the next s with this g is close, and never leaves the bracket.
             let value = (s - w) * g + b * s - r;
             if value > T::ZERO {
@@ -246,8 +234,9 @@ impl<T: Real> ModifiedLugre<T> {
         if size == T::ZERO {
             return T::ZERO;
         }
-        let value = |s: T| s * (self.stribeck.coefficient(s) + b) - size;
-        let (least, most) = (size / (self.stribeck.largest() + b), size / (self.stribeck.smallest() + b));
+        let value = |s: T| s * (self.bristles.stribeck.coefficient(s) + b) - size;
+        let (least, most) =
+            (size / (self.bristles.stribeck.largest() + b), size / (self.bristles.stribeck.smallest() + b));
         let start = if from.sign() == r.sign() { from.abs() } else { T::ZERO };
         let mut low = start.at_least(least).at_most(most);
         let mut high = low;
@@ -278,6 +267,12 @@ impl<T: Real> ModifiedLugre<T> {
     }
 }
 
+impl<T: Real> ModifiedLugreState<T> {
+    fn deformation_m(&self) -> T {
+        self.deflection_m
+    }
+}
+
 impl<T: Real> FrictionModel<T> {
     /// A modified LuGre element.
     pub fn modified_lugre(p: &LugreParameters<T>, step_s: T) -> Result<Self, ParameterError> {
@@ -299,11 +294,8 @@ impl<T: Real> Element<T> for ModifiedLugre<T> {
     }
 
     fn holding(&self, force_n: T, contact: &Contact<T>) -> ModifiedLugreState<T> {
-        let most_m = self.largest_deflection_m(contact.load_n());
-        ModifiedLugreState {
-            deflection_m: (force_n * self.inverse_sigma0).within(most_m),
-            ..ModifiedLugreState::default()
-        }
+        let LugreState { deflection_m } = Element::holding(&self.bristles, force_n, contact);
+        ModifiedLugreState { deflection_m, ..ModifiedLugreState::default() }
     }
 
     #[inline]
@@ -320,17 +312,7 @@ impl<T: Real> Element<T> for ModifiedLugre<T> {
         state.deflection_m
     }
 
-    fn largest_coefficient(&self) -> T {
-        self.stribeck.largest()
-    }
-
-    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
-        self.sigma0
-    }
-
-    fn stribeck(&self) -> Option<&Stribeck<T>> {
-        Some(&self.stribeck)
-    }
+    curve_and_stiffness_of!(bristles);
 
     fn winding_reach_m(&self, load_n: T) -> Option<T> {
         Some(self.largest_deflection_m(load_n))
@@ -355,44 +337,10 @@ impl<T: Real> Element<T> for Folded<T> {
         Ok(Self(ModifiedLugre { several_roots: true, ..model }))
     }
 
-    fn rest(&self) -> ModifiedLugreState<T> {
-        ModifiedLugreState::default()
-    }
-
-    fn holding(&self, force_n: T, contact: &Contact<T>) -> ModifiedLugreState<T> {
-        Element::holding(&self.0, force_n, contact)
-    }
-
-    fn set_step_s(&mut self, step_s: T) {
-        self.0.set_step_s(step_s);
-    }
-
-    fn step(&self, state: &mut ModifiedLugreState<T>, contact: &Contact<T>) -> FrictionForce<T> {
-        self.0.step(state, contact)
-    }
-
-    fn deformation_m(state: &ModifiedLugreState<T>) -> T {
-        state.deflection_m
-    }
-
-    fn largest_coefficient(&self) -> T {
-        self.0.stribeck.largest()
-    }
-
-    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
-        self.0.sigma0
-    }
-
-    fn stribeck(&self) -> Option<&Stribeck<T>> {
-        Some(&self.0.stribeck)
-    }
-
-    fn winding_reach_m(&self, load_n: T) -> Option<T> {
-        Some(self.0.largest_deflection_m(load_n))
-    }
+    does_what!(0 does, with ModifiedLugreState<T>);
 
     fn warning(&self) -> Option<&'static str> {
-        (!self.0.stribeck.momentum_rises()).then_some(
+        (!self.0.stribeck().momentum_rises()).then_some(
             "a0 <= a1 delta exp(-(1 + 1/delta)): the implicit equation has several roots, the element jumps between them \
              and its deflection may overshoot or never settle",
         )

@@ -16,7 +16,7 @@
 //! forgotten. Overshoot at constant speed and load: none, as LuGre.
 
 use super::contact::{Contact, FrictionForce};
-use super::element::{Element, ParameterSpec};
+use super::element::{Element, ParameterSpec, curve_and_stiffness_of};
 use super::lugre::{Lugre, LugreState, and_bristles, bristles_and};
 use super::stribeck::Stribeck;
 use crate::error::{ParameterError, require};
@@ -106,15 +106,5 @@ impl<T: Real> Element<T> for PrakashClifton<T> {
         state.deflection_m
     }
 
-    fn largest_coefficient(&self) -> T {
-        self.bristles.stribeck.largest()
-    }
-
-    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
-        self.bristles.sigma0
-    }
-
-    fn stribeck(&self) -> Option<&Stribeck<T>> {
-        Some(&self.bristles.stribeck)
-    }
+    curve_and_stiffness_of!(bristles);
 }

@@ -194,24 +194,6 @@ impl<T: Real, const N: usize> Series<T, N> {
         self.sigma1_per_step = self.lugre.sigma1 * self.inverse_step;
     }
 
-    /// The state that carries `force_n` at rest, its branches relaxed.
-    pub(super) fn held(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T, N> {
-        let held = force_n.within(contact.load_n() * self.lugre.stribeck.largest());
-        SeriesState {
-            deformation_m: held / self.k_u,
-            deflection_m: held * self.lugre.inverse_sigma0,
-            tip_speed_m_s: contact.sliding_speed_m_s,
-            mean_tip_speed_m_s: contact.sliding_speed_m_s,
-            mean_root_speed_m_s: contact.sliding_speed_m_s,
-            ..SeriesState::default()
-        }
-    }
-
-    /// Stiffness against a motion too quick for the branches to relax, N/m.
-    pub(super) fn unrelaxed_stiffness_n_per_m(&self) -> T {
-        self.branches.iter().fold(self.k_u, |sum, branch| sum + branch.stiffness)
-    }
-
     /// The bristles at the tip.
     pub fn bristles(&self) -> &Lugre<T> {
         &self.lugre
@@ -419,8 +401,16 @@ impl<T: Real> FrictionModel<T> {
     }
 }
 
-impl<T: Real> Element<T> for Series<T> {
-    type State = SeriesState<T>;
+impl<T: Real, const N: usize> SeriesState<T, N> {
+    /// Of the block.
+    pub(super) fn deformation_m(&self) -> T {
+        self.deformation_m
+    }
+}
+
+/// Built by its own numbers, an element's branches carry nothing.
+impl<T: Real, const N: usize> Element<T> for Series<T, N> {
+    type State = SeriesState<T, N>;
 
     const PARAMETERS: &'static [ParameterSpec] = &and_bristles::<2, 10>([
         ParameterSpec::required("k_u_n_per_m", 3e4).searched(1e3, 1e6).extensive(),
@@ -428,15 +418,25 @@ impl<T: Real> Element<T> for Series<T> {
     ]);
 
     fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {
-        Self::new(&SeriesParameters::from_values(values)?, step_s)
+        let parameters = SeriesParameters::from_values(values)?;
+        Self::with_branches(&parameters, [(T::ZERO, T::ONE); N], step_s)
     }
 
-    fn rest(&self) -> SeriesState<T> {
+    fn rest(&self) -> SeriesState<T, N> {
         SeriesState::default()
     }
 
-    fn holding(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T> {
-        self.held(force_n, contact)
+    /// Its branches are relaxed.
+    fn holding(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T, N> {
+        let held = force_n.within(contact.load_n() * self.lugre.stribeck.largest());
+        SeriesState {
+            deformation_m: held / self.k_u,
+            deflection_m: held * self.lugre.inverse_sigma0,
+            tip_speed_m_s: contact.sliding_speed_m_s,
+            mean_tip_speed_m_s: contact.sliding_speed_m_s,
+            mean_root_speed_m_s: contact.sliding_speed_m_s,
+            ..SeriesState::default()
+        }
     }
 
     #[inline]
@@ -445,11 +445,11 @@ impl<T: Real> Element<T> for Series<T> {
     }
 
     #[inline]
-    fn step(&self, state: &mut SeriesState<T>, contact: &Contact<T>) -> FrictionForce<T> {
+    fn step(&self, state: &mut SeriesState<T, N>, contact: &Contact<T>) -> FrictionForce<T> {
         self.step(state, contact)
     }
 
-    fn deformation_m(state: &SeriesState<T>) -> T {
+    fn deformation_m(state: &SeriesState<T, N>) -> T {
         state.deformation_m
     }
 
@@ -457,8 +457,9 @@ impl<T: Real> Element<T> for Series<T> {
         self.lugre.stribeck.largest()
     }
 
+    /// Against a motion too quick for the branches to relax.
     fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
-        self.k_u
+        self.branches.iter().fold(self.k_u, |sum, branch| sum + branch.stiffness)
     }
 
     fn stribeck(&self) -> Option<&Stribeck<T>> {
@@ -466,6 +467,6 @@ impl<T: Real> Element<T> for Series<T> {
     }
 
     fn block_time_s(&self) -> Option<T> {
-        Some(self.c_u / self.k_u)
+        Some(self.c_u / self.sticking_stiffness_n_per_m(T::ZERO))
     }
 }

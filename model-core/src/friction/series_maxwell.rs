@@ -16,7 +16,7 @@
 //! filled rubber (Payne), self-heating (the effect `thermal_fade` has it).
 
 use super::contact::{Contact, FrictionForce};
-use super::element::{Element, ParameterSpec, exactly};
+use super::element::{Element, ParameterSpec, does_what, exactly};
 use super::lugre::{LugreParameters, and_bristles};
 use super::series::{Series, SeriesParameters, SeriesState};
 use super::stribeck::Stribeck;
@@ -95,39 +95,5 @@ impl<T: Real> Element<T> for SeriesMaxwell<T> {
         Series::with_branches(&block, branches, step_s).map(Self)
     }
 
-    fn rest(&self) -> SeriesState<T, BRANCHES> {
-        SeriesState::default()
-    }
-
-    fn holding(&self, force_n: T, contact: &Contact<T>) -> SeriesState<T, BRANCHES> {
-        self.0.held(force_n, contact)
-    }
-
-    fn set_step_s(&mut self, step_s: T) {
-        self.0.set_step_s(step_s);
-    }
-
-    fn step(&self, state: &mut SeriesState<T, BRANCHES>, contact: &Contact<T>) -> FrictionForce<T> {
-        self.0.step(state, contact)
-    }
-
-    fn deformation_m(state: &SeriesState<T, BRANCHES>) -> T {
-        state.deformation_m
-    }
-
-    fn largest_coefficient(&self) -> T {
-        self.0.bristles().stribeck().largest()
-    }
-
-    fn sticking_stiffness_n_per_m(&self, _load_n: T) -> T {
-        self.0.unrelaxed_stiffness_n_per_m()
-    }
-
-    fn stribeck(&self) -> Option<&Stribeck<T>> {
-        Some(self.0.bristles().stribeck())
-    }
-
-    fn block_time_s(&self) -> Option<T> {
-        Some(self.0.damping_n_s_per_m() / self.0.unrelaxed_stiffness_n_per_m())
-    }
+    does_what!(0 does, with SeriesState<T, BRANCHES>);
 }
