@@ -6,10 +6,12 @@
 //! know is kept and not looked at.
 //!
 //! What cannot be read is a fault (`SettingsCorrupt`): all settings are then the defaults, and nothing is
-//! written until a person erases the store by command.
+//! written until a person erases the store by command. A model that this firmware does not understand, or cannot run
+//! with these settings, is left out alone: no rig moves otherwise for it, the observer predicts with the default model.
 
 use crate::board;
 use crate::flash::{Error as FlashError, SETTINGS, SettingsFlash};
+use heapless::Vec;
 use model_core::control::{ControlConfig, ControlSettings, ObserverModel};
 use model_core::error::ParameterError;
 use rig_link::model::ModelRecord;
@@ -260,6 +262,7 @@ async fn read(map: &mut Map) -> Result<Stored, Unreadable> {
     let mut buffer = [0; RECORD];
     let mut records = map.fetch_all_items(&mut buffer).await?;
     let mut buffer = [0; RECORD];
+    let mut model: Option<Vec<u8, RECORD>> = None;
     // The last record of a key comes last, so later ones simply replace earlier ones.
     while let Some((key, bytes)) = records.next::<&[u8]>(&mut buffer).await? {
         match key {
@@ -270,11 +273,9 @@ async fn read(map: &mut Map) -> Result<Stored, Unreadable> {
                     return Err(Unreadable::Schema(version));
                 }
             }
-            MODEL_KEY if bytes.is_empty() => stored.model = None,
-            MODEL_KEY => {
-                let (model, _) = postcard::take_from_bytes(bytes).map_err(|_| Unreadable::Record(key))?;
-                stored.model = Some(model);
-            }
+            MODEL_KEY if bytes.is_empty() => model = None,
+            // A record is never longer than the buffer that it was read into.
+            MODEL_KEY => model = Vec::from_slice(bytes).ok(),
             _ => {
                 if let Some((_, place)) = ALL.iter().zip(&mut stored.values).find(|(info, _)| info.key == key)
                 {
@@ -287,6 +288,18 @@ async fn read(map: &mut Map) -> Result<Stored, Unreadable> {
                 }
             }
         }
+    }
+    if let (Some(bytes), Ok(settings)) = (model, stored.settings()) {
+        stored.model = ModelRecord::from_stored(&bytes, &settings)
+            .inspect_err(|error| {
+                defmt::error!(
+                    "settings: the stored model is left out: {=str} = {=f64} is not {=str}",
+                    error.name,
+                    error.value,
+                    error.allowed
+                );
+            })
+            .ok();
     }
     Ok(stored)
 }

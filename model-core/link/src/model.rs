@@ -130,6 +130,20 @@ impl Default for ModelRecord {
 }
 
 impl ModelRecord {
+    /// A record as flash has it, where this firmware understands it and can run it with `settings`. A record outlives the
+    /// firmware that wrote it: another one may know its kind by no name, or with other parameters.
+    ///
+    /// # Errors
+    /// What is wrong with it: then the model alone is not in force, the other settings are.
+    pub fn from_stored(bytes: &[u8], settings: &ControlSettings) -> Result<Self, ParameterError> {
+        let (record, _): (Self, _) = postcard::take_from_bytes(bytes).map_err(|_| ParameterError {
+            name: "model",
+            value: bytes.len() as f64,
+            allowed: "a record that this firmware understands",
+        })?;
+        record.prepare(settings).map(|_| record)
+    }
+
     /// The model as the observer runs it, with the geometry and the control period of `settings`.
     ///
     /// # Errors

@@ -174,3 +174,21 @@ fn the_longest_model_fits_a_frame() {
     let request = Request { id: 1, command: Command::ModelSet(model) };
     assert!(encode(&request, &mut [0; MAX_FRAME]).is_ok());
 }
+
+#[test]
+fn a_stored_model_of_another_firmware_is_left_out_with_the_reason() {
+    let settings = ControlSettings::default();
+    let mut buffer = [0; 512];
+    let mut stored = |record: &ModelRecord| postcard::to_slice(record, &mut buffer).unwrap().to_vec();
+    let good = ModelRecord::default();
+    assert_eq!(ModelRecord::from_stored(&stored(&good), &settings), Ok(good.clone()));
+    // Cut short; a kind of a later version; a parameter more than this one has.
+    let bytes = stored(&good);
+    assert_eq!(ModelRecord::from_stored(&bytes[..bytes.len() / 2], &settings).unwrap_err().name, "model");
+    let mut later = good.clone();
+    later.friction.kind = String::try_from("tachyonic").unwrap();
+    assert_eq!(ModelRecord::from_stored(&stored(&later), &settings).unwrap_err().name, "kind");
+    let mut longer = good;
+    longer.friction.values.push(1.0).unwrap();
+    assert!(ModelRecord::from_stored(&stored(&longer), &settings).is_err());
+}
