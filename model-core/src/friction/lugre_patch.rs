@@ -10,6 +10,8 @@
 //! F/F_N = g (1 − Z/L (1 − e^{−L/Z})), Z = g |rω|/(σ0 |v_r|); the upwind differences reach it with
 //! an error of order 1/N.
 //!
+//! Other distributions of the load than a uniform one: [`super::pressure`].
+//!
 //! [`ModifiedLugrePatch`] is the same patch with eqs. 17–19 in each element.
 
 use super::contact::Contact;
@@ -141,6 +143,16 @@ impl<T: Real, const N: usize> LugrePatch<T, N> {
         }
         let sum = state.deflection_m.iter().fold(T::ZERO, |sum, u| sum + *u);
         load * (self.sigma0 * sum * self.share + self.a2 * v)
+    }
+
+    /// Bristle stiffness per unit load σ0, 1/m.
+    pub(super) fn stiffness_per_m(&self) -> T {
+        self.sigma0
+    }
+
+    /// Viscous coefficient a2, s/m.
+    pub(super) fn viscous_s_per_m(&self) -> T {
+        self.a2
     }
 
     /// Friction coefficient of the steady state by the closed form (uniform load).

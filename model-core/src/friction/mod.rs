@@ -35,6 +35,7 @@ pub mod maxwell_slip;
 pub mod modified_lugre;
 mod parameters;
 pub mod prakash_clifton;
+pub mod pressure;
 pub mod rate_state;
 #[macro_use]
 mod registry;
