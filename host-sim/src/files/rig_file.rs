@@ -4,6 +4,10 @@
 //! [`RigFile::assumed`]; only the friction radius must be there, as every friction force hangs on it.
 //! A bridge table left out is an ideal sensor; so is one half of it (`mode_hz` with `damping_ratio`, or
 //! `lowpass_hz`) where it is left out.
+//!
+//! Two entries can be given by their parts. The lever's gain by its arms, F_N = (τ/l1)(l2/l3): M1's torque τ on the arm
+//! `lever_l1_m` gives a force, which the lever `lever_l2_m` : `lever_l3_m` brings to the elements. The inertia that M2 turns by
+//! `inertia_discs` further discs of `inertia_disc_kg_m2` each, as the original rig has them.
 
 use std::path::Path;
 
@@ -78,7 +82,7 @@ pub struct RigFile {
     pub m1_stiffness_n_per_rad: f64,
     /// The motor that turns the disc.
     pub m2: Motor,
-    /// Inertia of M2 with its disc.
+    /// Inertia of M2 with its disc and all further inertia discs.
     pub m2_inertia_kg_m2: f64,
     /// Coulomb friction of the disc's bearing.
     pub bearing_coulomb_nm: f64,
@@ -194,7 +198,11 @@ impl<'a> Reading<'a> {
             .transpose()?
             .flatten()
             .ok_or_else(|| self.missing(&geometry, "friction_radius_m", POSITIVE))?;
-        let lever_gain_n_per_nm = self.number(&geometry, "lever_gain_n_per_nm", POSITIVE)?;
+        let by_arms = geometry.given.as_ref().map(lever_gain).transpose()?.flatten();
+        let lever_gain_n_per_nm = match by_arms {
+            Some(gain) => gain,
+            None => self.number(&geometry, "lever_gain_n_per_nm", POSITIVE)?,
+        };
 
         let (m1, m2) = (self.pair("m1")?, self.pair("m2")?);
         let (bearing, encoder, pressure) =
@@ -206,7 +214,9 @@ impl<'a> Reading<'a> {
         let friction_bridge = self.given.table("friction_bridge")?;
         let normal_bridge = self.given.table("normal_bridge")?;
         let shaft = self.given.table("shaft")?;
-        let m2_inertia_kg_m2 = self.number(&m2, "inertia_kg_m2", POSITIVE)?;
+        let own_inertia_kg_m2 = self.number(&m2, "inertia_kg_m2", POSITIVE)?;
+        let discs_kg_m2 = m2.given.as_ref().map(inertia_discs).transpose()?.unwrap_or(0.0);
+        let m2_inertia_kg_m2 = own_inertia_kg_m2 + discs_kg_m2;
         let rig = RigFile {
             source: source.into(),
             friction_radius_m,
@@ -235,6 +245,35 @@ impl<'a> Reading<'a> {
         }
         self.given.finish()?;
         Ok(rig)
+    }
+}
+
+/// F_N/τ by the lever's arms, where the file gives them.
+fn lever_gain(table: &TableReader<'_>) -> Result<Option<f64>, InputError> {
+    let twice = table.number("lever_gain_n_per_nm", POSITIVE)?.is_some();
+    let arms = ["lever_l1_m", "lever_l2_m", "lever_l3_m"];
+    let [l1, l2, l3] = arms.map(|key| table.number(key, POSITIVE));
+    match (l1?, l2?, l3?) {
+        (None, None, None) => Ok(None),
+        (Some(l1), Some(l2), Some(l3)) if !twice => Ok(Some(l2 / l3 / l1)),
+        (Some(_), Some(_), Some(_)) => Err(table
+            .error("lever_gain_n_per_nm", "is given twice")
+            .allowed("the gain, or the arms lever_l1_m, lever_l2_m, lever_l3_m")),
+        _ => {
+            let gap = arms.into_iter().find(|key| !table.has(key)).unwrap_or(arms[0]);
+            Err(table.missing(gap, "all three arms, or none"))
+        }
+    }
+}
+
+/// Inertia of the discs that are put on besides.
+fn inertia_discs(table: &TableReader<'_>) -> Result<f64, InputError> {
+    let count = table.integer("inertia_discs", 0, 100)?.unwrap_or(0);
+    let each = table.number("inertia_disc_kg_m2", POSITIVE)?;
+    match (count, each) {
+        (0, _) => Ok(0.0),
+        (_, Some(each)) => Ok(count as f64 * each),
+        _ => Err(table.missing("inertia_disc_kg_m2", "the inertia of one disc, a number, > 0")),
     }
 }
 
@@ -303,7 +342,22 @@ mod tests {
         assert_eq!(refused(""), "r.toml:1: geometry.friction_radius_m: is missing; allowed: a number, > 0");
         assert_eq!(
             refused(&format!("{geometry}lever_gain = 30\n")),
-            "r.toml:3: geometry.lever_gain = 30: unknown key; allowed: friction_radius_m, lever_gain_n_per_nm"
+            "r.toml:3: geometry.lever_gain = 30: unknown key; allowed: friction_radius_m, lever_gain_n_per_nm, \
+             lever_l1_m, lever_l2_m, lever_l3_m"
+        );
+        assert_eq!(
+            refused(&format!("{geometry}lever_l1_m = 0.05\nlever_l3_m = 0.1\n")),
+            "r.toml:1: geometry.lever_l2_m: is missing; allowed: all three arms, or none"
+        );
+        assert!(
+            refused(&format!(
+                "{geometry}lever_l1_m = 0.05\nlever_l2_m = 0.1\nlever_l3_m = 0.1\nlever_gain_n_per_nm = 30\n"
+            ))
+            .contains("lever_gain_n_per_nm = 30: is given twice")
+        );
+        assert!(
+            refused(&format!("{geometry}[m2]\ninertia_discs = 2\n"))
+                .contains("m2.inertia_disc_kg_m2: is missing")
         );
         assert_eq!(
             refused(&format!("{geometry}[pressure]\nmode_hz = -120\n")),
@@ -317,6 +371,16 @@ mod tests {
             refused(&format!("{geometry}[brake]\n"))
                 .starts_with("r.toml:3: brake: unknown key; allowed: geometry, m1")
         );
+    }
+
+    #[test]
+    fn lever_and_inertia_can_be_given_by_their_parts() {
+        let text = "[geometry]\nfriction_radius_m = 0.05\nlever_l1_m = 0.05\nlever_l2_m = 0.15\nlever_l3_m = 0.1\n\
+                    [m2]\ninertia_kg_m2 = 0.02\ninertia_discs = 3\ninertia_disc_kg_m2 = 0.01\n";
+        let rig = RigFile::parse("r.toml", text).unwrap();
+        assert!((rig.lever_gain_n_per_nm - 30.0).abs() < 1e-12, "{}", rig.lever_gain_n_per_nm);
+        assert!((rig.m2_inertia_kg_m2 - 0.05).abs() < 1e-15, "{}", rig.m2_inertia_kg_m2);
+        assert!(!rig.assumed.contains(&"geometry.lever_gain_n_per_nm".to_string()));
     }
 
     #[test]
