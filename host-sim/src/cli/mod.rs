@@ -22,6 +22,7 @@ mod session;
 mod settings;
 mod simulate;
 mod trials;
+mod vehicle;
 
 pub mod progress;
 
@@ -87,6 +88,7 @@ commands! {
     Simulate(simulate::Simulate),
     Trials(trials::Trials),
     Rivals(rivals::Rivals),
+    Vehicle(vehicle::Vehicle),
     Record(record::RecordArgs),
     Run(run::Run),
     Monitor(monitor::Monitor),

@@ -3,6 +3,7 @@
 pub mod bristle_damping;
 pub mod contenders;
 pub mod patch_crossing;
+pub mod quarter_car;
 pub mod readings;
 pub mod rivals;
 pub mod speed_sweep;
