@@ -4,6 +4,7 @@ use super::comparison::{Comparison, LOAD_STEP_S};
 use super::runs::ClosedLoop;
 use crate::lockstep::Frame;
 use crate::report::{Chart, Line, Panel, Role, Window};
+use model_core::friction::series::SeriesParameters;
 
 /// Converts rad/s to rpm.
 const RPM: f64 = 60.0 / std::f64::consts::TAU;
@@ -79,6 +80,12 @@ fn time_chart(run: &ClosedLoop, windows: Vec<Window>, torque_mode: bool) -> Char
         line("measured", Role::Measured, run, (0.015, 5e-4), |f| f64::from(f.record.friction_torque_nm)),
         line("true", Role::Series, run, (0.003, 5e-4), |f| f.truth.friction_torque_nm),
     ];
+    let friction = if torque_mode {
+        let motor = line("torque of M2", Role::Brush, run, (0.003, 5e-4), |f| f.truth.m2_torque_nm);
+        friction.into_iter().chain([motor]).collect()
+    } else {
+        friction
+    };
     let normal = vec![
         line("measured", Role::Measured, run, (0.2, 0.01), |f| f64::from(f.record.normal_force_n)),
         line("true", Role::Series, run, (0.05, 0.01), |f| f.truth.normal_force_n),
@@ -108,7 +115,10 @@ fn time_chart(run: &ClosedLoop, windows: Vec<Window>, torque_mode: bool) -> Char
             .into(),
         x_title: "time, s".into(),
         panels: vec![
-            Panel { y_title: "friction torque, N m".into(), lines: friction },
+            Panel {
+                y_title: if torque_mode { "torque, N m" } else { "friction torque, N m" }.into(),
+                lines: friction,
+            },
             Panel { y_title: "normal force, N".into(), lines: normal },
             motion,
         ],
@@ -139,17 +149,70 @@ fn hysteresis(run: &ClosedLoop) -> Chart {
         let truth = frames.iter().map(|f| f.truth.friction_torque_nm).collect();
         vec![line("measured", Role::Measured, measured), line("true", Role::Series, truth)]
     };
+    let beside = |name: &str, role, pick: fn(&Frame) -> f64| Line {
+        name: name.into(),
+        role,
+        x: angle.iter().map(|a| 1e3 * a).collect(),
+        y: frames.iter().map(|f| pick(f)).collect(),
+        tolerance: 1e-3,
+        fine_tolerance: 1e-3,
+    };
     Chart {
         title: format!("{}: friction torque over the disc's angle.", capitalised(&run.label())),
         caption: "The area of the loop is the energy that the elements take in one period. Below, the torque less the \
-                  straight line through it."
+                  straight line through it; lowest, what M2 sees, as the paper plots it, beside the ring's."
             .into(),
         x_title: "angle of the disc, mrad".into(),
         panels: vec![
             Panel { y_title: "friction torque, N m".into(), lines: lines(false) },
             Panel { y_title: "less the line, N m".into(), lines: lines(true) },
+            Panel {
+                y_title: "motor and bearing, N m".into(),
+                lines: vec![
+                    beside("torque of M2", Role::Brush, |f| f.truth.m2_torque_nm),
+                    beside("friction torque of the ring", Role::Series, |f| f.truth.friction_torque_nm),
+                    beside("torque of the bearing", Role::Lugre, |f| f.truth.bearing_torque_nm),
+                ],
+            },
         ],
         plane: true,
+        ..Chart::default()
+    }
+}
+
+/// Figs. 5, 24 and 25: the history of an element's stress, from the deformation that the plant has.
+pub(super) fn stress(run: &ClosedLoop, rubber: &SeriesParameters<f64>, radius_m: f64) -> Chart {
+    let pick = |name: &str, role, y: &dyn Fn(&Frame) -> f64| line(name, role, run, (0.2, 0.02), y);
+    let spring = |f: &Frame| rubber.k_u_n_per_m * f.truth.deformation_m;
+    let force = |f: &Frame| f.truth.friction_torque_nm / radius_m;
+    let end = run.recording.time_s(run.recording.frames.len());
+    Chart {
+        title: format!("Figs. 5, 24, 25: stress and deformation in {}.", run.label()),
+        caption: "All elements together. The spring's part follows the deformation; the damper carries the rest while the block \
+                  winds up and unwinds, so one deformation goes with many forces: the stress has a history."
+            .into(),
+        x_title: "time, s".into(),
+        panels: vec![
+            Panel {
+                y_title: "force, N".into(),
+                lines: vec![
+                    pick("friction", Role::Series, &force),
+                    pick("spring, k_u u", Role::Lugre, &spring),
+                    pick("damper, c_u u\u{307}", Role::Brush, &|f| force(f) - spring(f)),
+                ],
+            },
+            Panel {
+                y_title: "deformation u, mm".into(),
+                lines: vec![line("of the block", Role::Series, run, (0.01, 0.001), |f| {
+                    1e3 * f.truth.deformation_m
+                })],
+            },
+        ],
+        windows: vec![
+            window("120 ms from the load step", LOAD_STEP_S - 0.02, LOAD_STEP_S + 0.1),
+            window("the disc starts", 3.45, 3.75),
+            window("whole run", 0.0, end),
+        ],
         ..Chart::default()
     }
 }

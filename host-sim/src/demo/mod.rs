@@ -16,6 +16,7 @@ pub use comparison::Comparison;
 pub use runs::{ClosedLoop, Runs};
 pub use story::Story;
 
+use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 use crate::report::{Block, Page, Table};
 
@@ -55,6 +56,10 @@ fn page(runs: &Runs, story: &Story, axes: Table) -> Page {
     blocks.extend(
         runs.closed_loop.iter().flat_map(|run| charts::experiment(run).into_iter().map(Block::Chart)),
     );
+    let radius_m = RigFile::assumed_rig(&[]).map(|rig| rig.friction_radius_m);
+    if let (Some(run), Ok(radius_m)) = (runs.named("fig20"), radius_m) {
+        blocks.push(Block::Chart(charts::stress(run, &runs.rubber, radius_m)));
+    }
     blocks.push(Block::Heading("Five models side by side".into()));
     blocks.extend(findings::models(runs));
     for comparison in &runs.comparisons {
