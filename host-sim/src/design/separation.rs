@@ -7,7 +7,7 @@
 //! counts: either may be the true one.
 //!
 //! Where a model sticks and slips, the smallest change of a parameter moves every later event, and two runs of one rubber differ
-//! as much as two rubbers. So each model is run once more with a parameter moved by a hair ([`HAIR`]): what its derivatives do not
+//! as much as two rubbers. So each model is run once more with every parameter moved by a hair ([`HAIR`]): what its derivatives do not
 //! explain of that cannot be repeated, and is taken off.
 //! Left out: what noise in motion and load does, and a model that is wrong in a third way.
 
@@ -25,7 +25,7 @@ const UNKNOWN_PARAMETER: f64 = 0.1;
 const UNKNOWN_EFFECT: f64 = 0.5;
 /// Step of the difference quotients, in standard deviations.
 const DIFFERENCE: f64 = 0.05;
-/// Part of that by which a parameter is moved to see what can be repeated.
+/// Part of that by which every parameter is moved, up and down in turn, to see what can be repeated.
 const HAIR: f64 = 0.1;
 
 /// A model's prediction, and what it could be with other parameters.
@@ -35,7 +35,7 @@ pub struct Reach {
     pub torque_nm: Vec<f64>,
     /// Its change by one standard deviation of each parameter, N·m.
     pub moves_nm: Vec<Vec<f64>>,
-    /// The prediction with a parameter moved by a hair.
+    /// The prediction with every parameter moved by a hair.
     pub again_nm: Vec<f64>,
 }
 
@@ -44,9 +44,8 @@ impl Reach {
     pub fn new(model: &ModelFile, rig: &RigFile, inputs: &ContactInputs) -> Result<Self, InputError> {
         let run = |model: &ModelFile| simulate_friction_as(model, rig, inputs, Accuracy::Fast);
         let torque_nm = run(model)?;
-        let again = neighbours(model, HAIR * DIFFERENCE).into_iter().find_map(|twin| run(&twin).ok());
-        let again_nm = again.unwrap_or_else(|| torque_nm.clone());
-        let moves_nm = neighbours(model, DIFFERENCE)
+        let again_nm = run(&twin(model)).unwrap_or_else(|_| torque_nm.clone());
+        let moves_nm = neighbours(model)
             .into_par_iter()
             // A neighbour beyond a parameter's range is a direction in which the model cannot move.
             .filter_map(|neighbour| run(&neighbour).ok())
@@ -83,18 +82,32 @@ impl Reach {
     }
 }
 
-/// The model with one parameter at a time moved by `difference` of its standard deviation.
-fn neighbours(model: &ModelFile, difference: f64) -> Vec<ModelFile> {
+/// How far a parameter is uncertain; `None` where it is not moved.
+fn standard_deviation(model: &ModelFile, name: &str, value: f64) -> Option<f64> {
+    let known = model.intervals.get(name).map(|interval| interval.std).filter(|std| *std > 0.0);
+    let std = known.unwrap_or(UNKNOWN_PARAMETER * value.abs());
+    // The road factor scales a0 and a1, the exponent is a choice of the model's form.
+    (std > 0.0 && !matches!(name, "theta" | "delta")).then_some(std)
+}
+
+/// The model with every parameter moved by a hair; what is refused stays.
+fn twin(model: &ModelFile) -> ModelFile {
+    let mut moved = model.clone();
+    for (place, (name, value)) in model.parameters().enumerate() {
+        let Some(std) = standard_deviation(model, name, value) else { continue };
+        let hair = if place % 2 == 0 { HAIR } else { -HAIR };
+        let _ = moved.set(name, value + hair * DIFFERENCE * std);
+    }
+    moved
+}
+
+/// The model with one parameter at a time moved by [`DIFFERENCE`] of its standard deviation.
+fn neighbours(model: &ModelFile) -> Vec<ModelFile> {
     let mut all = Vec::new();
     for (name, value) in model.parameters() {
-        let known = model.intervals.get(name).map(|interval| interval.std).filter(|std| *std > 0.0);
-        let std = known.unwrap_or(UNKNOWN_PARAMETER * value.abs());
-        // The road factor scales a0 and a1, the exponent is a choice of the model's form.
-        if std == 0.0 || matches!(name, "theta" | "delta") {
-            continue;
-        }
+        let Some(std) = standard_deviation(model, name, value) else { continue };
         let mut moved = model.clone();
-        if moved.set(name, value + difference * std).is_ok() {
+        if moved.set(name, value + DIFFERENCE * std).is_ok() {
             all.push(moved);
         }
     }
@@ -103,7 +116,7 @@ fn neighbours(model: &ModelFile, difference: f64) -> Vec<ModelFile> {
             let mut moved = model.clone();
             let value = &mut moved.extensions[effect].parameters[at].1;
             if *value != 0.0 {
-                *value += difference * UNKNOWN_EFFECT * value.abs();
+                *value += DIFFERENCE * UNKNOWN_EFFECT * value.abs();
                 all.push(moved);
             }
         }

@@ -205,7 +205,7 @@ pub struct Stop {
     pub rim_m_s: Vec<f64>,
     /// F/F_N.
     pub coefficient: Vec<f64>,
-    /// Largest F/F_N, of every step.
+    /// Largest F/F_N until the wheel locks, of every step.
     pub peak: f64,
     /// Slip (v − Rω)/v there.
     pub slip_at_peak: f64,
@@ -244,7 +244,8 @@ pub fn brake(kind: PatchKind, braking: Braking) -> Result<Stop, ParameterError> 
         let rim = RADIUS_M * omega;
         let force_n = patch.step(v - rim, rim, load_n);
         let coefficient = force_n / load_n;
-        if coefficient > stop.peak {
+        // A locked wheel only slides: what it shows later is the curve at low speed.
+        if stop.lock.is_none() && coefficient > stop.peak {
             (stop.peak, stop.slip_at_peak, stop.speed_at_peak_m_s) = (coefficient, (v - rim) / v, v);
         }
         if k % 10 == 0 {
