@@ -18,10 +18,6 @@ use crate::input_error::InputError;
 /// Blocks of the standard error of a gain, s: longer than anything that correlates residuals.
 const BLOCK_S: f64 = 0.5;
 
-/// Errors of the contact are taken where the noise of motion and load between samples is below so many deviations of the
-/// sensor's: bristles at rest and the instants at which they break away show no law.
-const WELL_KNOWN: f64 = 10.0;
-
 /// Errors in one log.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LogErrors {
@@ -150,9 +146,11 @@ fn contact_errors(contact: &ContactPart, place: usize, logs: &[ContactLog], trai
     let extended = problem.predict(&own_terms, &fit.p).shown_nm;
     let mut errors = Errors::default();
     let mut at = 0;
+    // Bristles at rest and the instants at which they break away show no law.
+    let limit = problem.well_known_nm();
     for log in logs {
         let points: Vec<Point> = (0..log.len())
-            .filter(|i| log.usable[*i] && problem.noise.named(at + *i) < WELL_KNOWN * log.friction_noise_nm)
+            .filter(|i| log.usable[*i] && problem.noise.named(at + *i) < limit)
             .map(|i| {
                 let y = log.friction_nm[i];
                 Point {
