@@ -6,16 +6,16 @@
 //!
 //! | step | shows | drives |
 //! |---|---|---|
-//! | [`identity`] | who answers, the settings in force, that the chip computes as this computer does | off |
-//! | [`timing`] | rate and jitter of the control tick | off |
-//! | [`channels`] | supply and raw codes of every analogue channel | off |
-//! | [`switches`] | emergency stop, arm switch, the drives' fault lines | off |
-//! | [`encoders`] | direction and counts, turned by hand | off |
-//! | [`bridges`] | sign, scale and linearity, by known weights | off |
-//! | [`arming`] | enabled at zero torque, nothing moves | on, no torque |
-//! | [`torque`] | reference, amplifier, drive and monitor agree, and the motor turns the right way | small torque |
-//! | [`speed`] | the speed loop holds a slow speed and comes to rest | slow |
-//! | [`trips`] | each trip, provoked and seen | on, no torque; slow |
+//! | `identity` | who answers, the settings in force, that the chip computes as this computer does | off |
+//! | `timing` | rate and jitter of the control tick | off |
+//! | `channels` | supply and raw codes of every analogue channel | off |
+//! | `switches` | emergency stop, arm switch, the drives' fault lines | off |
+//! | `encoders` | direction and counts, turned by hand | off |
+//! | `bridges` | sign, scale and linearity, by known weights | off |
+//! | `arming` | enabled at zero torque, nothing moves | on, no torque |
+//! | `torque` | reference, amplifier, drive and monitor agree, and the motor turns the right way | small torque |
+//! | `speed` | the speed loop holds a slow speed and comes to rest | slow |
+//! | `trips` | each trip, provoked and seen | on, no torque; slow |
 
 mod arming;
 mod bridges;

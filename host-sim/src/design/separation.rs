@@ -7,7 +7,7 @@
 //! counts: either may be the true one.
 //!
 //! Where a model sticks and slips, the smallest change of a parameter moves every later event, and two runs of one rubber differ
-//! as much as two rubbers. So each model is run once more with every parameter moved by a hair ([`HAIR`]): what its derivatives do not
+//! as much as two rubbers. So each model is run once more with every parameter moved by a hair (`HAIR`): what its derivatives do not
 //! explain of that cannot be repeated, and is taken off.
 //! Left out: what noise in motion and load does, and a model that is wrong in a third way.
 

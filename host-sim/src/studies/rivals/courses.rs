@@ -144,7 +144,7 @@ impl Course {
         forces
     }
 
-    /// The same with [`AT_ONCE`] steps at a time where the motion is calm, by the model prepared for so long a step: good
+    /// The same with `AT_ONCE` steps at a time where the motion is calm, by the model prepared for so long a step: good
     /// enough for a derivative, in a third of the time.
     #[must_use]
     pub fn rough_force_n(&self, model: &FrictionModel<f64>, long: &FrictionModel<f64>) -> Vec<f64> {
