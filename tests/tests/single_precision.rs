@@ -40,6 +40,9 @@ fn motion(experiment: &str, kind: ModelKind) -> Vec<(f64, f64)> {
 }
 
 /// Steps a model through one control period from `a` to `b` in `n` steps; the force at its end.
+///
+/// In the period of touch the load at its end acts throughout: a contact with a memory of its load is born with the load of
+/// its first step, whatever that step's size, and both are to be born with the same.
 fn period<T: Real>(
     model: &FrictionModel<T>,
     state: &mut FrictionState<T>,
@@ -47,6 +50,7 @@ fn period<T: Real>(
     n: usize,
 ) -> f64 {
     let mut force = 0.0;
+    let a = if a.1 > 0.0 { a } else { (a.0, b.1) };
     for k in 0..n {
         let middle = (k as f64 + 0.5) / n as f64;
         let end = (k as f64 + 1.0) / n as f64;

@@ -274,9 +274,9 @@ pub fn search(balance: &mut Balance, alternatives: &[Alternative], most: usize) 
                 new
             });
             parents = solved.iter().take(3).map(|s| s.set.clone()).collect();
-            let gained = |best: f64| solved.first().is_some_and(|s| s.log_evidence > best);
-            let before = found.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-            let worth = gained(before);
+            let best =
+                |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+            let worth = best(&solved) > best(&found);
             found.extend(solved);
             // A larger set is looked for where this one was worth it.
             if !worth {

@@ -116,7 +116,7 @@ impl DriveLog {
             inertia * angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2)
         };
         let fits = |width: &f64| inertial(*width) < 0.5 * effort_noise * (0.5 / (root_pi * width)).sqrt();
-        let (narrowest, widest) = (if friction.is_some() { WIDTHS[2] } else { WIDTHS[0] }, WIDTHS[5]);
+        let (narrowest, widest) = (if contact { WIDTHS[2] } else { WIDTHS[0] }, WIDTHS[5]);
         let (width, inertial_noise) = if inertia.is_finite() {
             // A wider one would take out what ripples; what the acceleration's noise then makes is a noise of its own.
             let width = WIDTHS.into_iter().find(fits).unwrap_or(WIDE_ENOUGH).max(narrowest);

@@ -26,7 +26,7 @@ const MOST_CAUSES: usize = 3;
 /// ln of the prior probability that an effect of the library acts: one in fifty.
 const LOG_PRIOR: f64 = -3.9;
 /// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
-pub const EVIDENCE_SHARE: f64 = 0.1;
+const EVIDENCE_SHARE: f64 = 0.1;
 /// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
 const LEFT_SHARE: f64 = 0.5;
 /// The law of a cause is right within this share of its size: what a second one adds may be the first one's form.
@@ -107,6 +107,8 @@ pub struct ContactPart {
     pub noise: Noise,
     /// Sets, best first.
     pub ranked: Vec<search::Ranked>,
+    /// Of each set, how much each of its terms changes the prediction, relative to the signal.
+    pub sizes: Vec<Vec<f64>>,
     /// The drive's cause that moves the contact otherwise than the encoder says.
     pub disc_cause: Option<DiscCause>,
 }
@@ -185,7 +187,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
 ///
 /// # Errors
 /// Where a column is missing.
-pub fn drive_inertia(logs: &[Log]) -> Result<f64, InputError> {
+fn drive_inertia(logs: &[Log]) -> Result<f64, InputError> {
     let logs = logs.iter().map(|log| DriveLog::new(log, f64::INFINITY)).collect::<Result<Vec<_>, _>>()?;
     let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
     let balance = drive::balance(&logs, &nothing, &DriveScales::new(&logs));
@@ -274,8 +276,26 @@ pub struct Hypothesis {
     pub probability: f64,
 }
 
+/// An effect that changes less than it would have to.
+#[derive(Debug, Clone, Copy)]
+pub struct TooSmall {
+    /// Its id.
+    pub effect: &'static str,
+    /// What it changes, relative to the signal.
+    pub size: f64,
+    /// What it would have to exceed: the form of the model, a share of what is left and of a larger cause beside it.
+    pub floor: f64,
+}
+
 /// What is left, by balance.
 type Rests = Vec<(Part, Rest)>;
+
+impl Hypothesis {
+    /// ln evidence over all balances, without the prior of its causes.
+    pub fn log_evidence(&self) -> f64 {
+        (self.log_weight - LOG_PRIOR * self.effects.len() as f64) / EVIDENCE_SHARE
+    }
+}
 
 /// What was found.
 pub struct Judgement {
@@ -287,8 +307,8 @@ pub struct Judgement {
     pub press: Option<Linear>,
     /// All hypotheses compared, the answer first.
     pub hypotheses: Vec<Hypothesis>,
-    /// Effects that a balance asked for but that change less than the model's form is known to, with their sizes.
-    pub too_small: Vec<(&'static str, f64)>,
+    /// Effects that a balance asked for but that change too little.
+    pub too_small: Vec<TooSmall>,
     /// Probability that the rest is something that the library does not have.
     pub unknown: f64,
     /// What is left, by balance.
@@ -356,12 +376,13 @@ pub fn judge(
         }
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
-        let (noise, ranked, ends) = {
+        let (noise, ranked, sizes, ends) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, told);
+            let sizes = found.ranked.iter().map(|r| search::sizes(&problem, &r.fit)).collect();
             let best = &found.ranked[0].fit;
             let ends = problem.change(&best.terms, &best.p).ends_nm;
-            (problem.noise.clone(), found.ranked, ends)
+            (problem.noise.clone(), found.ranked, sizes, ends)
         };
         if let (Some(ends), true) = (ends, drive.is_some()) {
             // Where the friction channel shows its end, the drive's balance has no friction torque.
@@ -369,7 +390,8 @@ pub fn judge(
             seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
             drive = of_drive(&seen);
         }
-        contact = Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked, disc_cause });
+        contact =
+            Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked, sizes, disc_cause });
     } else {
         let inertia = drive_inertia(train)?;
         let logs = train.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
@@ -420,7 +442,7 @@ fn following_disc(logs: &[ContactLog], drive: &Linear) -> Option<(Vec<ContactLog
     Some((logs, cause.effect))
 }
 
-/// What the baseline leaves of these logs, over the deviations of its own noise model, and its mean square, (N m)².
+/// What the baseline leaves of these logs with a noise model of its own, N m, and its mean square, (N m)².
 fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64) {
     let problem = Problem::new(logs, baseline, &[]);
     let residual_nm: Vec<f64> = {
@@ -432,14 +454,12 @@ fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64)
 }
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
-    let problem = contact.problem();
     let ground = rest::Ground::new(contact);
     let mut out = Vec::new();
-    for (place, ranked) in contact.ranked.iter().enumerate() {
+    for (place, (ranked, sizes)) in contact.ranked.iter().zip(&contact.sizes).enumerate() {
         let fit = &ranked.fit;
-        let sizes = search::sizes(&problem, fit);
-        let mut effects: Vec<(&'static str, f64)> =
-            fit.terms.iter().map(|t| contact.terms[*t].effect).zip(sizes).collect();
+        let names = fit.terms.iter().map(|t| contact.terms[*t].effect);
+        let mut effects: Vec<(&'static str, f64)> = names.zip(sizes.iter().copied()).collect();
         effects.sort_by_key(|e| e.0);
         out.push(Candidate {
             effects: effects.iter().map(|e| e.0).collect(),
@@ -460,7 +480,7 @@ fn within<'c>(candidates: &'c [Candidate], effects: &[&str]) -> Option<&'c Candi
         .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
 }
 
-fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static str, f64)>) {
+fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
     // Sets: one candidate of each part, put together.
     let mut sets: Vec<Vec<&'static str>> = vec![Vec::new()];
     for (_, candidates) in parts {
@@ -499,13 +519,13 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<(&'static st
         .collect();
     all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     // An effect below what is known is taken out of the table, the smallest first.
-    let mut too_small: Vec<(&'static str, f64)> = Vec::new();
-    while let Some((effect, _, size)) = all.first().and_then(|best| {
-        let sizes = best.over_floor.iter().zip(&best.sizes);
-        let each = best.effects.iter().zip(sizes).map(|(effect, (over, size))| (*effect, *over, *size));
-        each.filter(|(_, over, _)| *over < 1.0).min_by(|a, b| a.1.total_cmp(&b.1))
+    let mut too_small = Vec::new();
+    while let Some((at, over)) = all.first().and_then(|best| {
+        let below = best.over_floor.iter().copied().enumerate().filter(|(_, over)| *over < 1.0);
+        below.min_by(|a, b| a.1.total_cmp(&b.1))
     }) {
-        too_small.push((effect, size));
+        let (effect, size) = (all[0].effects[at], all[0].sizes[at]);
+        too_small.push(TooSmall { effect, size, floor: size / over.max(1e-12) });
         all.retain(|h| !h.effects.contains(&effect));
     }
     // Two sets with the same effects in use are one.

@@ -128,7 +128,7 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         let over = cause.residual_nm.iter().zip(&problem.noise.deviation).zip(&fit.r);
         over.map(|((r, s), used)| if *used == 0.0 { 0.0 } else { r / s }).collect::<Vec<f64>>()
     });
-    let mut explained = search::sizes(&problem, fit);
+    let mut explained = contact.sizes[place].clone();
     if let (Some(as_logged), Some(none)) = (&as_logged, none) {
         explained.push(search::difference(&problem, none, as_logged));
     }

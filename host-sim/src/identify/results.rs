@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::contact::noise::MODEL_FORM;
 use super::effects::LIBRARY;
 use super::extended_model::Values;
 use super::holdout::{Errors, LogErrors};
@@ -302,9 +301,9 @@ fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Ca
     let without = judged.hypotheses.iter().find(|h| !h.effects.contains(&id));
     if let Some(without) = without {
         evidence.push(format!(
-            "the best explanation without it ({}) has a log evidence that is {:.0} lower",
+            "the best explanation without it ({}) {}",
             set_name(&without.effects),
-            (judged.best().log_weight - without.log_weight) / super::judge::EVIDENCE_SHARE
+            against(judged.best(), without)
         ));
     }
     for (part, errors) in found.holdout {
@@ -325,27 +324,38 @@ fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Ca
     Cause { id: id.into(), subsystem, probability, parameters, evidence }
 }
 
+/// How a rival stands against the answer.
+fn against(best: &Hypothesis, rival: &Hypothesis) -> String {
+    let lower = best.log_evidence() - rival.log_evidence();
+    if lower >= 0.5 {
+        format!("has a log evidence that is {lower:.0} lower")
+    } else if lower > -0.5 {
+        "has the same log evidence, and less prior or size".into()
+    } else {
+        format!("has a log evidence that is {:.0} higher, too little for its prior and size", -lower)
+    }
+}
+
 fn rejected(judged: &Judgement, verdict: &str, marginal: &dyn Fn(&str) -> f64) -> Vec<Rejected> {
     let best = judged.best();
     let named = |id: &str| verdict == "named" && best.effects.contains(&id);
     let mut out: Vec<Rejected> = Vec::new();
     for effect in LIBRARY.iter().map(|e| e.id()).filter(|id| !named(id)) {
         let with = judged.hypotheses.iter().find(|h| h.effects.contains(&effect));
-        let small = judged.too_small.iter().find(|(id, _)| *id == effect);
+        let small = judged.too_small.iter().find(|small| small.effect == effect);
         let why = match (with, small) {
-            (_, Some((_, size))) => format!(
-                "it would change the prediction by {} of the signal, less than the form of the model is known to ({})",
-                percent(*size),
-                percent(MODEL_FORM)
+            (_, Some(small)) => format!(
+                "it would change the prediction by {} of the signal, less than the {} that the form of the model, what is \
+                 left and the law of a larger cause leave open",
+                percent(small.size),
+                percent(small.floor)
             ),
             (Some(h), None) if h.effects == best.effects => {
                 "what is left is larger than what it explains".into()
             }
-            (Some(h), None) => format!(
-                "the best explanation with it ({}) has a log evidence that is {:.0} lower",
-                set_name(&h.effects),
-                (best.log_weight - h.log_weight) / super::judge::EVIDENCE_SHARE
-            ),
+            (Some(h), None) => {
+                format!("the best explanation with it ({}) {}", set_name(&h.effects), against(best, h))
+            }
             (None, None) => continue,
         };
         out.push(Rejected { id: effect.into(), probability: marginal(effect), why });

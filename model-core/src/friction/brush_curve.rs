@@ -12,6 +12,7 @@
 use super::brush::{Brush, BrushParameters, BrushState};
 use super::contact::{Contact, FrictionForce};
 use super::element::{Element, ParameterSpec, exactly};
+use super::lugre::and_curve;
 use super::stribeck::{Stribeck, StribeckParameters};
 use crate::error::{ParameterError, require};
 use crate::real::Real;
@@ -27,16 +28,10 @@ pub struct BrushCurve<T> {
 impl<T: Real> Element<T> for BrushCurve<T> {
     type State = BrushState<T>;
 
-    const PARAMETERS: &'static [ParameterSpec] = &[
+    const PARAMETERS: &'static [ParameterSpec] = &and_curve([
         ParameterSpec::required("c_n_per_m", 3e4).searched(1e3, 1e9).extensive(),
         ParameterSpec::optional("static_excess", 0.0).searched(0.0, 2.0),
-        ParameterSpec::required("a0", 0.5).searched(0.02, 5.0),
-        ParameterSpec::required("a1", 0.7).searched(0.0, 4.0),
-        ParameterSpec::optional("a2_s_per_m", 0.0).searched(0.0, 3.0),
-        ParameterSpec::required("v0_m_s", 0.5).searched(2e-3, 10.0),
-        ParameterSpec::optional("delta", 0.5),
-        ParameterSpec::optional("theta", 1.0),
-    ];
+    ]);
 
     /// µ_s = g(0) + `static_excess`: never below what it slides with from rest.
     fn build(values: &[T], step_s: T) -> Result<Self, ParameterError> {

@@ -170,9 +170,8 @@ impl<T: Real> Lugre<T> {
 /// Parameters of LuGre's bristles, which other models have too.
 pub(super) const PARAMETERS: &[ParameterSpec] = &BRISTLES;
 
-const BRISTLES: [ParameterSpec; 8] = [
-    ParameterSpec::required("sigma0_n_per_m", 1.76e7).searched(1e4, 1e9).extensive(),
-    ParameterSpec::optional("sigma1_n_s_per_m", 0.0).extensive(),
+/// What a model slides with: the Stribeck curve and the viscous part.
+const CURVE: [ParameterSpec; 6] = [
     ParameterSpec::required("a0", 0.5).searched(0.02, 5.0),
     ParameterSpec::required("a1", 0.7).searched(0.0, 4.0),
     ParameterSpec::optional("a2_s_per_m", 0.0).searched(0.0, 3.0),
@@ -180,6 +179,18 @@ const BRISTLES: [ParameterSpec; 8] = [
     ParameterSpec::optional("delta", 0.5),
     ParameterSpec::optional("theta", 1.0),
 ];
+
+const BRISTLES: [ParameterSpec; 8] = and_curve([
+    ParameterSpec::required("sigma0_n_per_m", 1.76e7).searched(1e4, 1e9).extensive(),
+    ParameterSpec::optional("sigma1_n_s_per_m", 0.0).extensive(),
+]);
+
+/// What sticks, two parameters, followed by the curve that it slides with.
+pub(super) const fn and_curve(first: [ParameterSpec; 2]) -> [ParameterSpec; 8] {
+    let [a, b] = first;
+    let [c, d, e, f, g, h] = CURVE;
+    [a, b, c, d, e, f, g, h]
+}
 
 /// The bristles' parameters followed by those of what carries them; `N` is the number of all.
 pub(super) const fn and_bristles<const M: usize, const N: usize>(

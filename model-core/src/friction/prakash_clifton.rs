@@ -12,8 +12,9 @@
 //! load: A. Cochard, J. Rice, J. Geophysical Research 105 (2000) 25891–25907. Measured on metals: for rubber L is assumed.
 //!
 //! **Step**: N exact for held speed and a load that changes linearly, z exact for the mean of N over the step: second
-//! order. A contact is born with the load that it has; without load the bristles spring back at once and all is
-//! forgotten. Overshoot at constant speed and load: none, as LuGre.
+//! order. A contact is born with the load at the end of the step in which it touches (at the next step size another one:
+//! it is forgotten after L of sliding); without load the bristles spring back at once and all is forgotten. Overshoot at
+//! constant speed and load: none, as LuGre.
 
 use super::contact::{Contact, FrictionForce};
 use super::element::{Element, ParameterSpec, curve_and_stiffness_of};

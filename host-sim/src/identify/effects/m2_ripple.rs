@@ -60,10 +60,9 @@ impl Effect for M2Ripple {
             .iter()
             .map(|log| gaussian(&log.position, 1.0, 1).iter().map(|d| d / log.grid.step_s).collect())
             .collect();
-        let whole: Vec<Vec<f64>> = positions.iter().map(|x| x.to_vec()).collect();
         for alternative in &mut all {
             let orders = fixed_orders(&alternative.constants);
-            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&whole, &speed, *k)));
+            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&positions, &speed, *k)));
             alternative.constants.extend(sizes);
         }
         all

@@ -103,9 +103,9 @@ pub fn joint(
 }
 
 /// Amplitude of a wave in a signal about its mean, by least squares, over all logs, each with a phase of its own.
-pub fn amplitude(x: &[Vec<f64>], signal: &[Vec<f64>], k: f64) -> f64 {
+pub fn amplitude(positions: &[&[f64]], signal: &[Vec<f64>], k: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for (x, values) in x.iter().zip(signal) {
+    for (x, values) in positions.iter().zip(signal) {
         let columns: Vec<Vec<f64>> = [f64::cos as fn(f64) -> f64, f64::sin, |_| 1.0]
             .into_iter()
             .map(|wave| x.iter().map(|x| wave(k * x)).collect())
