@@ -100,6 +100,8 @@ pub const CAPS: RawCaps = RawCaps {
 
 /// Control ticks per second.
 pub const TICK_HZ: u32 = 10_000;
+/// Window in which each analogue input must move by its noise, 25 ms: 16 bit codes of 50 µV move with every sensor.
+pub const FROZEN_TICKS: u32 = 250;
 /// Clock of TIM6, which makes the control period.
 pub const TICK_TIMER_HZ: u32 = 240_000_000;
 

@@ -23,8 +23,8 @@ bind_interrupts!(struct Irqs {
 const WORD: usize = flash::WRITE_SIZE;
 /// Bytes of a sector of this chip.
 const SECTOR: usize = 128 * 1024;
-/// Offset of the settings from the start of flash: sectors 0 and 1 of bank 2.
-pub const SETTINGS: core::ops::Range<u32> = 0x10_0000..0x14_0000;
+/// Offset of the settings from the start of flash: sectors 0 and 1 of bank 2, and in 2 the journal of their erasing.
+pub const SETTINGS: core::ops::Range<u32> = 0x10_0000..0x16_0000;
 /// Address of offset 0.
 const BASE: usize = 0x0800_0000;
 /// Longest time for one word (0.4 ms by the data sheet) or one sector (4 s).

@@ -11,7 +11,6 @@ use embassy_executor::{SpawnError, SpawnToken, Spawner};
 use model_core::control::ControlState;
 use rig_firmware::flash::SettingsFlash;
 use rig_firmware::link::{self, Identity, Operator};
-use rig_firmware::settings::Settings;
 use rig_firmware::start::{self, Started};
 use rig_firmware::{adc_scan, encoders, log, memory, restart, tick, watchdog};
 
@@ -27,7 +26,10 @@ async fn main(spawner: Spawner) {
             record.text.as_str()
         );
     }
-    let settings = Settings::load(SettingsFlash::new(board.flash)).await;
+    let settings = match rig_firmware::settings::load(SettingsFlash::new(board.flash)).await {
+        Ok(settings) => settings,
+        Err(error) => panic!("the settings' flash does not work: {error:?}"),
+    };
     let config = match settings.config() {
         Ok(config) => config,
         Err(error) => panic!("the default settings are out of range: {error}"),

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | flash bank 1 | program | the settings are in bank 2, so erasing them does not stall fetches |
 //! | flash bank 2, sectors 0 and 1 | settings | two sectors: one is erased while the other is valid |
+//! | flash bank 2, sector 2 | journal of their erasing | a sector half erased at a power cut is known as such |
 //! | DTCM, first 56 KB | stack | at its lower end memory ends: an overflow traps instead of overwriting |
 //! | DTCM, the rest | `.data`, `.bss`: state of the loop | no wait states, no cache: the tick's time is steady |
 //! | AXI SRAM, 480 KB | rows of the capture | largest memory; written by the tick, read by the link |

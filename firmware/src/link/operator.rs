@@ -253,8 +253,8 @@ impl Operator {
         if !drives_off() {
             return Answer::Rejected(Rejection::NotDisabled);
         }
-        if self.settings.erase().await.is_err() {
-            return Answer::Rejected(Rejection::Storage);
+        if let Err(refused) = self.settings.erase().await {
+            return not_stored(&refused);
         }
         match self.settings.config() {
             Ok(config) => self.change(&config).await.map_or_else(|answer| answer, |()| Answer::Done),
@@ -293,7 +293,11 @@ fn read_capture(offset: u32) -> Answer {
 fn not_stored(refused: &NotStored) -> Answer {
     match refused {
         NotStored::OutOfRange(error) => out_of_range(error),
-        NotStored::Storage => Answer::Rejected(Rejection::Storage),
+        NotStored::Storage(error) => {
+            defmt::warn!("settings: {}", error);
+            Answer::Rejected(Rejection::Storage)
+        }
+        NotStored::Damaged | NotStored::TooLong => Answer::Rejected(Rejection::Storage),
     }
 }
 

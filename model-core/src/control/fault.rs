@@ -33,6 +33,7 @@ numbered! {
         M2TorqueMismatch = 29, "The torque of M2 is not what its drive was asked for.";
         SupplyLow = 32, "The supply voltage is too low.";
         SupplyHigh = 33, "The supply voltage is too high.";
+        AnalogueFrozen = 34, "An analogue input stays at one code, without its noise.";
         DeadlineBudget = 36, "Too many control ticks ended late.";
         LinkLost = 37, "The host was not heard while the drives were on.";
         CalculationInvalid = 38, "A control value was not a finite number.";
@@ -41,6 +42,7 @@ numbered! {
         WatchdogReset = 41, "The watchdog restarted the controller.";
         Panic = 42, "The firmware stopped itself and restarted; its message is kept.";
         HardFault = 43, "The processor trapped and restarted; its registers are kept.";
+        StateCorrupt = 44, "The mode in memory and its copy differ: a bit turned over.";
     }
 }
 

@@ -10,6 +10,7 @@
 use super::bridge::BridgeFailure;
 use super::encoder_watch::Loss;
 use super::fault::{Fault, FaultSet};
+use super::frozen::{self, FrozenState};
 use super::inputs::Lines;
 use super::samples::Samples;
 use super::settings::ControlSettings;
@@ -25,6 +26,8 @@ pub(crate) struct Guard {
     supply_high_v: f32,
     supply_ticks: u32,
     stall_ticks: u32,
+    /// Scans of a window in which a channel must move; 0: not watched.
+    frozen_ticks: u32,
     overrun_budget: u32,
     deadline_budget: u32,
     leak_ticks: u32,
@@ -40,6 +43,7 @@ pub(crate) struct GuardState {
     supply_low: u32,
     supply_high: u32,
     stale: u32,
+    frozen: FrozenState,
     overruns: u32,
     late: u32,
     irregular: u32,
@@ -91,6 +95,7 @@ impl Guard {
             supply_high_v: s.high_v,
             supply_ticks: ticks(s.persistence_s),
             stall_ticks: t.adc_stall_ticks,
+            frozen_ticks: t.adc_frozen_ticks,
             overrun_budget: t.adc_overrun_budget,
             deadline_budget: t.deadline_budget,
             leak_ticks: ticks(1.0),
@@ -118,6 +123,11 @@ impl Guard {
         let silent = sight.link_needed && !samples.link_heard;
         causes.insert_if(Fault::LinkLost, lasts(&mut state.silent, silent, self.link_ticks));
         self.levels(state, sight, &mut causes);
+        if self.frozen_ticks != 0 && samples.adc_fresh {
+            let frozen = frozen::step(&mut state.frozen, self.frozen_ticks, &samples.adc);
+            // What stays at a code that means another fault is told as that.
+            causes.insert_if(Fault::AnalogueFrozen, frozen && causes.is_empty());
+        }
         causes
     }
 

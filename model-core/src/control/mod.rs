@@ -17,6 +17,7 @@ pub mod experiment_error;
 pub mod fault;
 #[cfg(test)]
 mod fault_tests;
+mod frozen;
 mod guard;
 mod inputs;
 pub mod limit;

@@ -207,6 +207,8 @@ pub struct TimingSettings {
     pub boot_s: f32,
     /// Ticks without a new scan before the converter counts as stalled.
     pub adc_stall_ticks: u32,
+    /// Ticks of a window in which each analogue input must move by its noise; 0 where it has none. The board decides it.
+    pub adc_frozen_ticks: u32,
     /// Scans lost before that is a fault; one is forgiven every second.
     pub adc_overrun_budget: u32,
     /// Late ticks before that is a fault; one is forgiven every second.
@@ -296,6 +298,7 @@ impl Default for ControlSettings {
             timing: TimingSettings {
                 boot_s: 0.1,
                 adc_stall_ticks: 2,
+                adc_frozen_ticks: 0,
                 adc_overrun_budget: 3,
                 deadline_budget: 5,
                 link_timeout_s: 0.5,

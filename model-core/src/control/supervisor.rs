@@ -77,6 +77,26 @@ impl Restart {
     }
 }
 
+/// The mode with its complement: whoever reads it while they do not fit reads [`Mode::Fault`]. One bit of memory that turns
+/// over would else make `Running` of `Disabled`, and enable the drives with nobody having armed them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct KeptMode {
+    number: u8,
+    complement: u8,
+}
+
+impl KeptMode {
+    const fn new(mode: Mode) -> Self {
+        Self { number: mode.number(), complement: !mode.number() }
+    }
+
+    /// The mode; none if it does not fit its complement.
+    #[inline(always)]
+    const fn get(self) -> Option<Mode> {
+        if self.number ^ self.complement == 0xFF { Mode::from_number(self.number) } else { None }
+    }
+}
+
 /// Coefficients of the supervisor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Timing {
@@ -90,7 +110,7 @@ pub(crate) struct Timing {
 /// What the supervisor remembers.
 #[derive(Debug, Clone)]
 pub(crate) struct Supervisor {
-    mode: Mode,
+    mode: KeptMode,
     ticks_in_mode: u32,
     ticks_at_rest: u32,
     latched: FaultSet,
@@ -123,7 +143,7 @@ impl Supervisor {
         }
         found_at_start.insert_if(Fault::SettingsCorrupt, !settings_intact);
         Self {
-            mode: Mode::Boot,
+            mode: KeptMode::new(Mode::Boot),
             ticks_in_mode: 0,
             ticks_at_rest: 0,
             latched: FaultSet::EMPTY,
@@ -145,7 +165,14 @@ impl Supervisor {
         // A bounce of a switch that is on is no release.
         self.ticks_off = if watch.arm_switch_off { self.ticks_off.saturating_add(1) } else { 0 };
         self.switch_released |= self.ticks_off >= timing.permission_ticks;
-        match self.mode {
+        let Some(mode) = self.mode.get() else {
+            let mut corrupt = FaultSet::EMPTY;
+            corrupt.insert(Fault::StateCorrupt);
+            self.mode = KeptMode::new(Mode::Fault);
+            self.latch(corrupt.union(watch.causes).union(self.found_at_start), tick, events);
+            return;
+        };
+        match mode {
             Mode::Boot => {
                 if self.ticks_in_mode > timing.boot_ticks {
                     if self.found_at_start.is_empty() {
@@ -162,7 +189,7 @@ impl Supervisor {
                     self.latch(watch.causes, tick, events);
                 } else if !watch.arm_switch {
                     self.change(Mode::Disabled, Reason::ArmSwitchOff, tick, events);
-                } else if self.mode == Mode::Stopping {
+                } else if mode == Mode::Stopping {
                     if self.ticks_at_rest >= timing.rest_ticks && self.ticks_in_mode >= timing.rest_ticks {
                         self.change(Mode::Armed, Reason::AtRest, tick, events);
                     } else if self.ticks_in_mode >= timing.stop_ticks {
@@ -185,20 +212,20 @@ impl Supervisor {
         for fault in new.iter() {
             events.push(tick, EventKind::FaultLatched(fault));
         }
-        if self.mode != Mode::Fault {
+        if self.mode() != Mode::Fault {
             self.change(Mode::Fault, Reason::FaultLatched, tick, events);
         }
     }
 
     fn change(&mut self, to: Mode, reason: Reason, tick: u64, events: &mut EventQueue) {
-        let from = self.mode;
-        (self.mode, self.ticks_in_mode, self.ticks_at_rest) = (to, 0, 0);
+        let from = self.mode();
+        (self.mode, self.ticks_in_mode, self.ticks_at_rest) = (KeptMode::new(to), 0, 0);
         events.push(tick, EventKind::ModeChanged { from, to, reason });
     }
 
     pub(crate) fn arm(&mut self, tick: u64, events: &mut EventQueue) -> Result<(), Refused> {
         let refuse = |reason| Err(Refused::because(reason));
-        match self.mode {
+        match self.mode() {
             Mode::Boot => refuse(Refusal::Starting),
             Mode::Fault => Err(Refused::by_fault(Refusal::FaultLatched, self.first)),
             Mode::Armed | Mode::Running | Mode::Stopping => refuse(Refusal::NotDisabled),
@@ -215,14 +242,14 @@ impl Supervisor {
     }
 
     pub(crate) fn disarm(&mut self, tick: u64, events: &mut EventQueue) {
-        if self.mode.is_live() {
+        if self.mode().is_live() {
             self.change(Mode::Disabled, Reason::DisarmCommand, tick, events);
         }
     }
 
     /// From `Armed` to `Running`; `ready` tells whether there is something to run.
     pub(crate) fn start(&mut self, ready: bool, tick: u64, events: &mut EventQueue) -> Result<(), Refused> {
-        match self.mode {
+        match self.mode() {
             Mode::Fault => Err(Refused::by_fault(Refusal::FaultLatched, self.first)),
             Mode::Running | Mode::Stopping => Err(Refused::because(Refusal::Running)),
             Mode::Boot | Mode::Disabled => Err(Refused::because(Refusal::NotArmed)),
@@ -235,7 +262,7 @@ impl Supervisor {
     }
 
     pub(crate) fn stop(&mut self, tick: u64, events: &mut EventQueue) -> Result<(), Refused> {
-        if self.mode == Mode::Running {
+        if self.mode() == Mode::Running {
             self.change(Mode::Stopping, Reason::StopCommand, tick, events);
             Ok(())
         } else {
@@ -245,13 +272,13 @@ impl Supervisor {
 
     /// The experiment came to its end.
     pub(crate) fn finish(&mut self, tick: u64, events: &mut EventQueue) {
-        if self.mode == Mode::Running {
+        if self.mode() == Mode::Running {
             self.change(Mode::Stopping, Reason::ExperimentFinished, tick, events);
         }
     }
 
     pub(crate) fn clear(&mut self, tick: u64, events: &mut EventQueue) -> Result<(), Refused> {
-        if self.mode != Mode::Fault {
+        if self.mode() != Mode::Fault {
             return Err(Refused::because(Refusal::NoFault));
         }
         if !self.causes.is_empty() {
@@ -265,8 +292,9 @@ impl Supervisor {
         Ok(())
     }
 
+    #[inline(always)]
     pub(crate) fn mode(&self) -> Mode {
-        self.mode
+        self.mode.get().unwrap_or(Mode::Fault)
     }
     pub(crate) fn first_fault(&self) -> Option<Fault> {
         self.first
@@ -276,5 +304,35 @@ impl Supervisor {
     }
     pub(crate) fn causes(&self) -> FaultSet {
         self.causes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMING: Timing = Timing { boot_ticks: 10, stop_ticks: 10, rest_ticks: 10, permission_ticks: 10 };
+    const QUIET: Watch =
+        Watch { causes: FaultSet::EMPTY, arm_switch: true, arm_switch_off: false, at_rest: true };
+
+    #[test]
+    fn one_bit_of_the_mode_that_turns_over_enables_no_drive_and_is_a_fault() {
+        for from in Mode::ALL {
+            for bit in 0..16 {
+                let mut supervisor = Supervisor::new(Restart::Ordinary, true);
+                let mut events = EventQueue::default();
+                supervisor.mode = KeptMode::new(*from);
+                if bit < 8 {
+                    supervisor.mode.number ^= 1 << bit;
+                } else {
+                    supervisor.mode.complement ^= 1 << (bit - 8);
+                }
+                assert!(!supervisor.mode().is_live(), "{from:?}, bit {bit}");
+                supervisor.step(&TIMING, QUIET, 1, &mut events);
+                assert_eq!(supervisor.mode(), Mode::Fault, "{from:?}, bit {bit}");
+                assert!(supervisor.latched().contains(Fault::StateCorrupt), "{from:?}, bit {bit}");
+                assert_eq!(supervisor.clear(2, &mut events), Ok(()));
+            }
+        }
     }
 }

@@ -130,6 +130,7 @@ pub(crate) fn validate(s: &ControlSettings) -> Result<(), ParameterError> {
     within!(s.torque_watch.gain_tolerance, 0.0..=0.5, "");
     within!(s.torque_watch.lag_tolerance, 0.0..=1.0, "");
     within!(s.timing.boot_s, 0.0..=10.0, " s");
+    relation!(s.timing.adc_frozen_ticks, s.timing.adc_frozen_ticks <= 100_000, "0 … 100000");
     relation!(s.timing.adc_stall_ticks, (1..=100).contains(&s.timing.adc_stall_ticks), "1 … 100");
     relation!(s.timing.adc_overrun_budget, s.timing.adc_overrun_budget <= 1000, "0 … 1000");
     relation!(s.timing.deadline_budget, s.timing.deadline_budget <= 1000, "0 … 1000");

@@ -98,6 +98,7 @@ const CASES: &[(&str, Change, &[f32])] = &[
     ("torque_watch.gain_tolerance", |s, v| s.torque_watch.gain_tolerance = v, &[-0.1, 0.6]),
     ("torque_watch.lag_tolerance", |s, v| s.torque_watch.lag_tolerance = v, &[-0.1, 1.1]),
     ("timing.boot_s", |s, v| s.timing.boot_s = v, &[-1.0, 10.1]),
+    ("timing.adc_frozen_ticks", |s, v| s.timing.adc_frozen_ticks = v as u32, &[100_001.0]),
     ("timing.adc_stall_ticks", |s, v| s.timing.adc_stall_ticks = v as u32, &[0.0, 101.0]),
     ("timing.adc_overrun_budget", |s, v| s.timing.adc_overrun_budget = v as u32, &[1001.0]),
     ("timing.deadline_budget", |s, v| s.timing.deadline_budget = v as u32, &[1001.0]),
