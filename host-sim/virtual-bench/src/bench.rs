@@ -58,19 +58,29 @@ pub fn run_on<T: Send>(
     let driver = BenchDriver::resumed(Addresses::of(firmware), saved, end);
     let board = RigBoard::new().map_err(emulator_error)?;
     let mut session = Session::new(Box::new(board), 0, VirtualNanos(PERIOD)).map_err(emulator_error)?;
-    // The emulator reads a snapshot from a file only.
-    let path =
-        scratch.join(format!("bench-{}-{:?}.snapshot", std::process::id(), std::thread::current().id()));
-    std::fs::write(&path, &saved.file).map_err(emulator_error)?;
-    let snapshot = Snapshot::read(&path).map_err(emulator_error);
-    let _ = std::fs::remove_file(&path);
-    let snapshot = snapshot?;
+    let snapshot = read(saved, scratch)?;
     let resume =
         snapshot.restore(&mut session, &firmware.digest, &mut NothingMore).map_err(emulator_error)?;
     session.run_until(VirtualNanos(saved.next));
     let mut start = Start::new(&firmware.images);
     start.resume = Some(&resume);
     work(session, &start, driver, endpoint, operator)
+}
+
+/// The emulator reads a snapshot from a file only, and keeps what it read until the process ends: once for each.
+fn read<'a>(saved: &'a Saved, scratch: &Path) -> Result<&'a Snapshot, BenchError> {
+    let mut file = saved.file.lock().map_err(emulator_error)?;
+    if let Some(snapshot) = saved.read.get() {
+        return Ok(snapshot);
+    }
+    let path =
+        scratch.join(format!("bench-{}-{:?}.snapshot", std::process::id(), std::thread::current().id()));
+    std::fs::write(&path, &*file).map_err(emulator_error)?;
+    let snapshot = Snapshot::read(&path).map_err(emulator_error);
+    let _ = std::fs::remove_file(&path);
+    let snapshot = snapshot?;
+    *file = Vec::new();
+    Ok(saved.read.get_or_init(|| snapshot))
 }
 
 fn work<T: Send>(

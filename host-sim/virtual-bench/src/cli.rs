@@ -1,7 +1,7 @@
 //! The command line of `cargo virtual-bench`.
 
 use crate::budget::{Budget, Cost};
-use crate::campaign;
+use crate::campaign::{self, Plan};
 use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{self, Done, ObserverResidual, Request};
@@ -9,6 +9,7 @@ use crate::firmware_build;
 use crate::serve::miswired::Mistake;
 use crate::serve::pace::Speed;
 use crate::serve::{self, Served};
+use crate::soak;
 use clap::{ArgGroup, Parser};
 use host_sim::cli::common::{SetArgs, say, wrong_argument};
 use host_sim::cli::progress::Progress;
@@ -36,7 +37,8 @@ const BAD_INPUT: u8 = 2;
 Examples:
   cargo virtual-bench --experiment fig20 --out target/bench/fig20
   cargo virtual-bench --serve --link /tmp/rig --arm-when-asked
-  cargo virtual-bench --faults
+  cargo virtual-bench --faults --out target/bench/faults
+  cargo virtual-bench --soak 3600
   cargo virtual-bench --write-budget
   cargo virtual-bench --experiment fig20 --observer model-extended.toml --out target/bench/extended
 
@@ -56,6 +58,18 @@ struct Cli {
     /// Make everything go wrong that can, and see that the firmware ends it
     #[arg(long, group = "what")]
     faults: bool,
+    /// With --faults: instants drawn in each of the five states, each fault at each of them
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "faults")]
+    instants: usize,
+    /// With --faults: branches of a run at a time
+    #[arg(long, value_name = "N", default_value_t = 2, requires = "faults")]
+    jobs: usize,
+    /// With --faults: only those with this in their name
+    #[arg(long, value_name = "TEXT", requires = "faults")]
+    only: Option<String>,
+    /// Run experiments and commands drawn by a seed for so many seconds of the bench's time, and see that nothing is lost
+    #[arg(long, value_name = "S", group = "what")]
+    soak: Option<f64>,
     /// Run all experiments and record anew what a control tick costs (budget.toml)
     #[arg(long, group = "what")]
     write_budget: bool,
@@ -71,8 +85,8 @@ struct Cli {
     /// With --serve: turn the arm switch off and on whenever the rig asks for it
     #[arg(long, requires = "serve")]
     arm_when_asked: bool,
-    /// With --serve: seed of the sensors' noise
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "serve")]
+    /// With --serve: seed of the sensors' noise; with --faults: of the instants and the bits
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["experiment", "write_budget"])]
     seed: u64,
     /// With --serve: wire the bench wrongly, to see what commissioning says; may be given several times
     #[arg(long, value_name = "MISTAKE", requires = "serve")]
@@ -150,7 +164,10 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 
 fn run(cli: Cli) -> Result<(), BenchError> {
     if cli.faults {
-        return run_faults(&firmware(cli.elf)?);
+        return run_faults(&cli, &firmware(cli.elf.clone())?);
+    }
+    if let Some(seconds) = cli.soak {
+        return run_soak(&cli, seconds, &firmware(cli.elf.clone())?);
     }
     if cli.write_budget {
         return Budget::write(&firmware(cli.elf)?, &mut |name, cost| {
@@ -190,17 +207,49 @@ fn run_service(cli: Cli) -> Result<(), BenchError> {
     serve::serve(&firmware(cli.elf)?, &served)
 }
 
-fn run_faults(firmware: &Firmware) -> Result<(), BenchError> {
-    let verdicts = campaign::run(firmware, &std::env::temp_dir(), &mut |verdict| {
-        eprintln!("{}: {}", verdict.name, if verdict.held() { "ok" } else { "FAILED" });
+fn run_faults(cli: &Cli, firmware: &Firmware) -> Result<(), BenchError> {
+    let plan = Plan {
+        instants: cli.instants,
+        seed: cli.seed,
+        at_once: cli.jobs,
+        only: cli.only.clone(),
+        ..Plan::whole()
+    };
+    let started = Instant::now();
+    let mut progress: Option<Progress> = None;
+    let mut done = 0;
+    let runs = campaign::run(firmware, &plan, &mut |new, total| {
+        done += new.len();
+        progress.get_or_insert_with(|| Progress::new("faults", total as u64)).set(done as u64);
+        for run in campaign::table::failed(new) {
+            eprintln!("{}, {}: {}", run.fault, run.state.name(), run.row.problems.join("; "));
+        }
     })?;
-    say(&campaign::table(&verdicts));
-    let failed = verdicts.iter().filter(|verdict| !verdict.held()).count();
+    drop(progress);
+    say(&campaign::table::table(&runs));
+    say(&format!("{:.0} s", started.elapsed().as_secs_f64()));
+    if let Some(out) = &cli.out {
+        if cli.force {
+            output_dir::allow_overwriting();
+        }
+        let mut output = OutputDir::new(out)?;
+        output.write_json("faults.json", &runs)?;
+        output.finish()?;
+    }
+    let failed = campaign::table::failed(&runs).len();
     if failed == 0 {
         Ok(())
     } else {
-        Err(BenchError::Check(format!("{failed} of {} faults", verdicts.len())))
+        Err(BenchError::Check(format!("{failed} of {} runs", campaign::table::counted(&runs))))
     }
+}
+
+fn run_soak(cli: &Cli, seconds: f64, firmware: &Firmware) -> Result<(), BenchError> {
+    let mut progress = Progress::new("soak", seconds as u64);
+    let soaked = soak::soak(firmware, seconds, cli.seed, &mut |done| progress.set(done as u64))?;
+    drop(progress);
+    say(&format!("{soaked:#?}"));
+    if soaked.problems.is_empty() { Ok(()) } else { Err(BenchError::Check(soaked.problems.join("; "))) }
 }
 
 fn firmware(elf: Option<PathBuf>) -> Result<Firmware, BenchError> {

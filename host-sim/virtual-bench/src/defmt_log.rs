@@ -68,14 +68,19 @@ pub(crate) fn decode_into(table: &Table, decoder: &mut dyn StreamDecoder, log: &
 /// # Errors
 /// The ELF holds no defmt table of this decoder's version.
 pub fn decode(elf: &[u8], starts: &[Vec<u8>]) -> Result<DefmtLog, BenchError> {
-    let table = table(elf)?;
+    Ok(decode_with(&table(elf)?, starts))
+}
+
+/// The same with a table that was read before.
+#[must_use]
+pub(crate) fn decode_with(table: &Table, starts: &[Vec<u8>]) -> DefmtLog {
     let mut log = DefmtLog::default();
     for bytes in starts {
         let mut decoder = table.new_stream_decoder();
         decoder.received(bytes);
-        decode_into(&table, decoder.as_mut(), &mut log);
+        decode_into(table, decoder.as_mut(), &mut log);
     }
-    Ok(log)
+    log
 }
 
 #[cfg(test)]

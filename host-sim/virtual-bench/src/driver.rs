@@ -6,29 +6,40 @@
 //! over the period. So what a tick computes from the samples of one period acts from the start of the next: one
 //! control period of delay, as in the PC rig.
 
+use crate::branch::{self, Side};
 use crate::elf::Firmware;
 use crate::endpoint::{BenchEnd, Question, ToBench, ToEndpoint};
+use crate::interference::Obstacle;
 use crate::meter::{Meter, Moment};
 use crate::outside::{Action, DriveInputs, Outside, PlantSide, Sensors};
 use crate::part::Part;
 use crate::part::adc_trigger::REFERENCE_MICROVOLT;
-use crate::part::encoder_timer::Disturbance;
+use crate::part::encoder_timer::{Disturbance, Edge};
 use crate::record::{Record, Saved};
 use crate::rtt::Rtt;
+use crate::sighting::{Deviations, Lookout};
 use crate::{board::RigBoard, interference, pins, serial};
 use rigless::device::ResetCause;
-use rigless::emulator::{AccessKind, Driver, HitKind, Host, Settled, Stop};
+use rigless::emulator::{AccessKind, Driver, HitKind, Host, Settled, Stop, Watch};
 use rigless::mcu::Mcu;
 use rigless::session::Session;
 use rigless::snapshot;
 use rigless::soc::Width;
 use rigless::soc::stm32h743::generated::{DAC, GPIOD};
 use rigless::time::VirtualNanos;
+use std::sync::{Mutex, OnceLock};
 
 /// The control period, ns.
 pub const PERIOD: u64 = 100_000;
 /// Interrupt of the link's DMA, DMA1 stream 0 (RM0433 table 147).
 const LOW_LINE: u64 = 11;
+/// That of the executor's time, TIM3, which comes twice a millisecond, and the tick's, DMA1 stream 7.
+const EXECUTOR_LINE: u64 = 29;
+const TICK_LINE: u64 = 47;
+/// What a loose contact reads as while it is open, µV.
+const OPEN_MICROVOLT: u32 = 3_299_000;
+/// Time between two counts of a jump, ns: longer than the input's filter.
+const JUMP_NS: u64 = 150;
 /// A branch to itself, Thumb.
 const ENDLESS_LOOP: u64 = 0xE7FE;
 /// `udf #0`: for ever undefined.
@@ -54,6 +65,17 @@ impl Addresses {
     }
 }
 
+/// Where the chance of loose contacts begins, the same in every run.
+const CHANCE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// The next of a series of numbers without order (xorshift).
+fn draw(state: &mut u64) -> u64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state
+}
+
 /// The driver.
 pub(crate) struct BenchDriver {
     addresses: Addresses,
@@ -67,7 +89,21 @@ pub(crate) struct BenchDriver {
     wakes_at: Option<u64>,
     received: Vec<u8>,
     resets_seen: usize,
-    patched: Option<(u64, u64)>,
+    /// Flash that a fault changed, as it was: address, width, value.
+    patched: Vec<(u64, Width, u64)>,
+    /// Code that a fault put in the core's way.
+    in_the_way: Option<u64>,
+    lookout: Lookout,
+    deviations: Deviations,
+    /// Scans spoilt when the operator began to look out.
+    spoilt: u64,
+    /// Counts still to jump, and counts jumped so far.
+    jumps: [(u32, i64); 2],
+    chance: u64,
+    /// Loose contacts that are open in this period.
+    open: [bool; 5],
+    /// In the last period a drive got another reference than the chip gave.
+    wrong_reference: bool,
     next: u64,
     record: Record,
 }
@@ -104,7 +140,15 @@ impl BenchDriver {
             wakes_at: None,
             received: Vec::new(),
             resets_seen: 0,
-            patched: None,
+            patched: Vec::new(),
+            in_the_way: None,
+            lookout: Lookout::default(),
+            deviations: Deviations::default(),
+            spoilt: 0,
+            jumps: Default::default(),
+            chance: CHANCE_SEED,
+            open: [false; 5],
+            wrong_reference: false,
             next: PERIOD,
             record: Record::default(),
         }
@@ -120,7 +164,8 @@ impl BenchDriver {
     }
 
     /// What the run leaves behind.
-    pub(crate) fn into_record(self) -> Record {
+    pub(crate) fn into_record(mut self) -> Record {
+        self.record.seen = self.lookout.seen;
         self.record
     }
 
@@ -135,7 +180,7 @@ impl BenchDriver {
 
     /// Switches and drives to their pins, voltages to their inputs.
     fn show_outside(&self, part: &mut Part, at: VirtualNanos) {
-        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, wiring, .. } = &self.outside;
+        let Outside { arm_switch, stop_pressed, healthy, held_microvolt, loose, wiring, .. } = &self.outside;
         pins::drive(part, at, pins::ARM_SWITCH, *arm_switch != wiring.arm_switch_inverted);
         pins::drive(part, at, pins::STOP_RELEASED, wiring.stop_bridged || !stop_pressed);
         for (place, healthy) in pins::DRIVE_HEALTHY.into_iter().zip(healthy) {
@@ -143,7 +188,12 @@ impl BenchDriver {
         }
         let arriving = wiring.arriving(&self.sensors, REFERENCE_MICROVOLT / 2);
         for (index, channel) in pins::ADC_CHANNELS.into_iter().enumerate() {
-            let microvolt = held_microvolt[index].unwrap_or(arriving[index]);
+            let open = loose[index] && self.open[index];
+            let microvolt = match held_microvolt[index] {
+                _ if open => OPEN_MICROVOLT,
+                Some(held) => held,
+                None => arriving[index],
+            };
             part.adc1.set_input(channel, microvolt);
         }
     }
@@ -165,19 +215,48 @@ impl BenchDriver {
         self.record.note_outputs(at.0, outputs);
     }
 
-    /// One period of the plant, and its edges into the encoders' timers.
-    fn step_plant(&mut self, part: &mut Part, at: VirtualNanos) {
+    /// What the scan of the coming period finds at the inputs.
+    fn deviate(&mut self, wrong_reference: bool) {
+        let Outside { held_microvolt, loose, wiring, .. } = &self.outside;
+        let arriving = wiring.arriving(&self.sensors, REFERENCE_MICROVOLT / 2);
+        for open in &mut self.open {
+            *open = draw(&mut self.chance) & 1 != 0;
+        }
+        let held = held_microvolt.iter().zip(arriving);
+        let is_other = |held: u32, plant: u32| held.abs_diff(plant) > REFERENCE_MICROVOLT >> 16;
+        self.deviations.analogue = wrong_reference
+            || held.into_iter().any(|(held, plant)| held.is_some_and(|held| is_other(held, plant)))
+            || loose.iter().zip(self.open).any(|(loose, open)| *loose && open);
+    }
+
+    /// One period of the plant, and its edges into the encoders' timers. Says whether a drive gets another reference
+    /// than the chip gives.
+    fn step_plant(&mut self, part: &mut Part, at: VirtualNanos) -> bool {
         let mut inputs = Self::outputs(part, at);
-        for (code, wire) in inputs.dac.iter_mut().zip(self.outside.references) {
-            *code = wire.pass(*code);
+        let mut wrong = false;
+        for ((code, wire), enabled) in inputs.dac.iter_mut().zip(self.outside.references).zip(inputs.enabled)
+        {
+            let passed = wire.pass(*code);
+            wrong |= enabled && passed != *code;
+            *code = passed;
         }
         let wiring = self.outside.wiring;
         inputs.dac = wiring.followed(inputs.dac);
-        let encoders = &mut part.encoders;
+        let (encoders, jumps) = (&mut part.encoders, &mut self.jumps);
+        let mut edges: [Vec<Edge>; 2] = Default::default();
         self.sensors = self.plant.step(at, &inputs, &mut |motor, edge| {
             let plug = motor as usize;
-            encoders[if wiring.encoders_exchanged { 1 - plug } else { plug }].push(edge);
+            edges[if wiring.encoders_exchanged { 1 - plug } else { plug }].push(edge);
         });
+        for (which, edges) in edges.into_iter().enumerate() {
+            jump(&mut jumps[which], at, edges, encoders[which].last_count(), &mut |edge| {
+                encoders[which].push(edge);
+            });
+        }
+        if self.lookout.is_on() {
+            self.record.motion.push((at.0 + PERIOD, self.plant.motion()));
+        }
+        wrong
     }
 
     fn act(&mut self, action: Action, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
@@ -217,8 +296,34 @@ impl BenchDriver {
             Action::MaskInterrupts { times, from_ns, for_ns } => {
                 let stub =
                     interference::masking_stub(host, self.addresses.low_handler, times, from_ns, for_ns);
-                // Flash, which the bench may program as the models do.
-                let _ = host.program(interference::vector(LOW_LINE), Width::W32, stub);
+                self.program(interference::vector(LOW_LINE), Width::W32, stub, host);
+                self.watch(interference::MASKED_AT, host);
+            }
+            Action::AnalogueFrozen(index) => {
+                if let Some(input) = self.outside.held_microvolt.get_mut(index) {
+                    *input = self.sensors.microvolt.get(index).copied();
+                }
+            }
+            Action::AnalogueLoose(index, loose) => {
+                if let Some(input) = self.outside.loose.get_mut(index) {
+                    *input = loose;
+                }
+            }
+            Action::EncoderJump(motor, counts) => {
+                self.jumps[motor as usize].0 = counts;
+                self.deviations.encoders[motor as usize] = true;
+            }
+            Action::HangMasked => self.obstruct(EXECUTOR_LINE, Obstacle::HangMasked, host),
+            Action::BusError => self.obstruct(TICK_LINE, Obstacle::BusError, host),
+            Action::ClockFails => {
+                part.fail_crystal(stop.at);
+                self.obstruct(TICK_LINE, Obstacle::ClockFailure, host);
+            }
+            Action::FlipBit { address, bit } => {
+                if let Ok(byte) = host.read(address, Width::W8) {
+                    // It is RAM: it was read just now.
+                    let _ = host.write(address, Width::W8, byte ^ 1 << (bit & 7));
+                }
             }
             Action::AdcStalled(stalled) => part.adc1.stall(stalled),
             Action::LinkSilent(silent) => serial::silence(part, silent),
@@ -253,11 +358,33 @@ impl BenchDriver {
 
     /// Puts an instruction where a handler begins; the next reset puts the handler back.
     fn patch(&mut self, address: u64, instruction: u64, host: &mut dyn Host) {
-        if let Ok(original) = host.read(address, Width::W16)
-            && host.program(address, Width::W16, instruction).is_ok()
-        {
-            self.patched = Some((address, original));
+        self.program(address, Width::W16, instruction, host);
+        self.watch(address, host);
+    }
+
+    /// Puts code before the handler of an interrupt; the next reset puts the vector back.
+    fn obstruct(&mut self, line: u64, what: Obstacle, host: &mut dyn Host) {
+        let vector = interference::vector(line);
+        if let Ok(original) = host.read(vector, Width::W32) {
+            let stub = interference::obstacle(host, original, what);
+            self.program(vector, Width::W32, stub, host);
+            self.watch(interference::STUB, host);
         }
+    }
+
+    /// Changes flash until the next reset.
+    fn program(&mut self, address: u64, width: Width, value: u64, host: &mut dyn Host) {
+        if let Ok(original) = host.read(address, width)
+            && host.program(address, width, value).is_ok()
+        {
+            self.patched.push((address, width, original));
+        }
+    }
+
+    /// Sees to it that the core's arrival at this instruction is noticed.
+    fn watch(&mut self, address: u64, host: &mut dyn Host) {
+        host.watch(Watch::Instruction(address));
+        self.in_the_way = Some(address);
     }
 
     fn drain_log(&mut self, host: &mut dyn Host) {
@@ -274,10 +401,11 @@ impl BenchDriver {
             self.drain_log(host);
             self.rtt.restarted(host);
         }
-        if let Some((address, original)) = self.patched.take() {
+        for (address, width, original) in self.patched.drain(..).rev() {
             // It was programmed there before.
-            let _ = host.program(address, Width::W16, original);
+            let _ = host.program(address, width, original);
         }
+        self.lookout.restarted(at.0);
         self.meter.restarted();
         self.record.restarted(&new);
         self.note_outputs(&mut session.board_mut().part, at);
@@ -309,6 +437,23 @@ impl BenchDriver {
                 }
                 ToBench::Send(bytes) => serial::send(&mut session.board_mut().part, &bytes),
                 ToBench::Act(action) => self.act(action, session, stop, host),
+                ToBench::Branch { jobs, at_once } => {
+                    let branched = branch::split(jobs, at_once);
+                    let sent = match branched {
+                        Ok(Side::Trunk(results)) => {
+                            self.end.to_endpoint.send(ToEndpoint::Branched(Ok(results)))
+                        }
+                        Ok(Side::Branch(job)) => {
+                            // In a process of its own, with an operator of its own.
+                            self.end = job.begin(stop.at.0);
+                            continue;
+                        }
+                        Err(error) => self.end.to_endpoint.send(ToEndpoint::Branched(Err(error.to_string()))),
+                    };
+                    if sent.is_err() {
+                        return false;
+                    }
+                }
                 ToBench::Ask(question) => {
                     let answer = self.answer(question, session, stop, host);
                     if self.end.to_endpoint.send(answer).is_err() {
@@ -347,11 +492,24 @@ impl BenchDriver {
                 ToEndpoint::Log(std::mem::replace(&mut self.record.log, vec![Vec::new()]))
             }
             Question::Register(address) => ToEndpoint::Register(interference::read(part, stop.at, address)),
+            Question::LookOut(wanted) => {
+                self.lookout.begin(wanted);
+                self.spoilt = part.adc1.spoilt();
+                ToEndpoint::Done(Ok(()))
+            }
+            Question::Record => {
+                let mut record = std::mem::take(&mut self.record);
+                record.seen.clone_from(&self.lookout.seen);
+                ToEndpoint::Record(Box::new(record))
+            }
+            Question::Motion => ToEndpoint::Motion(self.plant.motion()),
+            Question::Seen => ToEndpoint::Seen(self.lookout.seen.clone()),
             Question::Snapshot => {
                 let taken = snapshot::take(session, host, stop, &self.addresses.digest, &NothingMore);
                 ToEndpoint::Done(taken.map_err(|error| error.to_string()).map(|taken| {
                     self.record.saved = Some(Saved {
-                        file: taken.file,
+                        file: Mutex::new(taken.file),
+                        read: OnceLock::new(),
                         plant: self.plant.duplicate(),
                         sensors: self.sensors,
                         outside: self.outside.clone(),
@@ -370,6 +528,36 @@ impl BenchDriver {
     }
 }
 
+/// Hands an encoder's edges of a period on, with the counts between them that a jump adds.
+fn jump(
+    (left, jumped): &mut (u32, i64),
+    at: VirtualNanos,
+    mut edges: Vec<Edge>,
+    last: i64,
+    push: &mut dyn FnMut(Edge),
+) {
+    let mut count = last;
+    if *left > 0 {
+        // Each edge of the plant becomes a step up or down from where the jump has come to by then.
+        let mut steps: Vec<(VirtualNanos, i64)> = Vec::new();
+        let mut before = last - *jumped;
+        for edge in edges.drain(..) {
+            steps.push((edge.at, edge.count - before));
+            before = edge.count;
+        }
+        steps.extend((1..=u64::from(*left)).map(|nth| (VirtualNanos(at.0 + nth * JUMP_NS), 1)));
+        steps.sort_unstable();
+        (*jumped, *left) = (*jumped + i64::from(*left), 0);
+        for (at, step) in steps {
+            count += step;
+            push(Edge { at, count });
+        }
+    }
+    for edge in edges {
+        push(Edge { at: edge.at, count: edge.count + *jumped });
+    }
+}
+
 /// Fills all RAM with bytes that mean nothing, as it is found after a power-on.
 fn lose_memory(session: &mut Session<RigBoard>, host: &mut dyn Host) {
     let regions: Vec<(u64, u64)> = session
@@ -381,14 +569,11 @@ fn lose_memory(session: &mut Session<RigBoard>, host: &mut dyn Host) {
         .filter(|region| region.name != "flash")
         .map(|region| (region.base, region.size))
         .collect();
-    let mut noise = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut noise = CHANCE_SEED;
     for (base, size) in regions {
         for address in (base..base + size).step_by(8) {
-            noise ^= noise << 13;
-            noise ^= noise >> 7;
-            noise ^= noise << 17;
             // What cannot be written is no RAM.
-            if host.write(address, Width::W64, noise).is_err() {
+            if host.write(address, Width::W64, draw(&mut noise)).is_err() {
                 break;
             }
         }
@@ -398,7 +583,7 @@ fn lose_memory(session: &mut Session<RigBoard>, host: &mut dyn Host) {
 impl Driver<RigBoard> for BenchDriver {
     fn on_settled(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, settled: Settled) {
         match settled {
-            Settled::Access { access, .. } => {
+            Settled::Access { access, value } => {
                 if access.kind == AccessKind::Write {
                     let moment =
                         Moment { instructions: access.instruction_count, nanos: access.virtual_time.0 };
@@ -413,9 +598,20 @@ impl Driver<RigBoard> for BenchDriver {
                         self.note_outputs(&mut session.board_mut().part, access.virtual_time);
                     }
                 }
+                if self.lookout.is_looking() {
+                    let part = &session.board().part;
+                    self.deviations.scan = part.adc1.spoilt() != self.spoilt;
+                    for (deviated, encoder) in self.deviations.encoders.iter_mut().zip(&part.encoders) {
+                        *deviated |= encoder.deviated();
+                    }
+                    self.lookout.access(&access, value, &self.deviations);
+                }
                 self.look_for_restart(session, host, access.virtual_time);
             }
             Settled::Hit(hit) if hit.kind == HitKind::Instruction => {
+                if self.in_the_way == Some(hit.address) {
+                    self.lookout.arrived(hit.address, hit.at.0);
+                }
                 self.meter.handler_entered(Moment { instructions: hit.instruction_count, nanos: hit.at.0 });
             }
             Settled::Stop(stop) => self.look_for_restart(session, host, stop.at),
@@ -436,7 +632,9 @@ impl Driver<RigBoard> for BenchDriver {
         let part = &mut session.board_mut().part;
         self.show_outside(part, stop.at);
         self.note_outputs(part, stop.at);
-        self.step_plant(part, stop.at);
+        let wrong_reference = std::mem::take(&mut self.wrong_reference);
+        self.deviate(wrong_reference);
+        self.wrong_reference = self.step_plant(part, stop.at);
         self.received.extend(serial::take_received(part));
         self.record.last_at = stop.at.0;
         self.record.instructions = stop.instruction_count;

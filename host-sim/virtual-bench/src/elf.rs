@@ -11,6 +11,9 @@ const TICK_HANDLERS: [&str; 2] = ["DMA1_STREAM7", "TIM6_DAC"];
 /// A handler between the threads and the control tick: that of the link's DMA.
 const LOW_HANDLER: &str = "DMA1_STREAM0";
 
+/// The control tick's static, as its symbol is mangled.
+const CONTROL_STATE: &str = "4tick4TICK";
+
 /// The ELF and what was found in it.
 #[derive(Debug)]
 pub struct Firmware {
@@ -28,6 +31,8 @@ pub struct Firmware {
     pub tick_handlers: [u64; 2],
     /// Address of the first instruction of a handler the control tick interrupts, and which interrupts the threads.
     pub low_handler: u64,
+    /// Address and length of what the control tick remembers.
+    pub control_state: (u64, u64),
 }
 
 impl Firmware {
@@ -49,9 +54,14 @@ impl Firmware {
         let rtt_block = address("_SEGGER_RTT")?;
         let tick_handlers = [address(TICK_HANDLERS[0])?, address(TICK_HANDLERS[1])?];
         let low_handler = address(LOW_HANDLER)?;
+        let control_state = object
+            .symbols()
+            .find(|symbol| symbol.name().is_ok_and(|name| name.contains(CONTROL_STATE)))
+            .map(|symbol| (symbol.address(), symbol.size()))
+            .ok_or_else(|| bad(format!("it has no symbol with `{CONTROL_STATE}`")))?;
         let images = vec![Image::new(path, bytes.clone(), None).map_err(|error| bad(error.to_string()))?];
         let digest = image::digest(&images, None);
         let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Self { bytes, sha256, images, digest, rtt_block, tick_handlers, low_handler })
+        Ok(Self { bytes, sha256, images, digest, rtt_block, tick_handlers, low_handler, control_state })
     }
 }

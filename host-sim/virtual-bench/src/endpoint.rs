@@ -5,19 +5,26 @@
 //! only when the operator waits for more, or for an instant. So the operator's wall-clock speed does not
 //! matter, and two runs are the same run.
 
+use crate::branch::Job;
 use crate::error::BenchError;
 use crate::meter::Ticks;
-use crate::outside::{Action, DriveInputs};
+use crate::outside::{Action, DriveInputs, Motion};
+use crate::record::Record;
+use crate::sighting::{Seen, Sighting};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// From the operator to the emulator's side.
-#[derive(Debug)]
 pub(crate) enum ToBench {
     Send(Vec<u8>),
     Act(Action),
     Ask(Question),
     /// Wake me when bytes come, or at this instant.
     Wait(u64),
+    /// Go on from here as often as there are jobs, each in a process of its own.
+    Branch {
+        jobs: Vec<Job>,
+        at_once: usize,
+    },
 }
 
 /// What the operator may ask.
@@ -30,6 +37,10 @@ pub(crate) enum Question {
     Memory { address: u64, length: u64 },
     Register(u64),
     Snapshot,
+    LookOut(Sighting),
+    Seen,
+    Record,
+    Motion,
     TakeLog,
 }
 
@@ -43,6 +54,10 @@ pub(crate) enum ToEndpoint {
     Memory(Vec<u8>),
     Log(Vec<Vec<u8>>),
     Register(u64),
+    Seen(Option<Seen>),
+    Record(Box<Record>),
+    Motion(Motion),
+    Branched(Result<Vec<Vec<u8>>, String>),
     Done(Result<(), String>),
 }
 
@@ -64,9 +79,14 @@ pub struct Endpoint {
 
 /// An endpoint and the emulator's end of it.
 pub(crate) fn endpoint() -> (Endpoint, BenchEnd) {
+    endpoint_at(0)
+}
+
+/// The same at an instant, ns.
+pub(crate) fn endpoint_at(now: u64) -> (Endpoint, BenchEnd) {
     let (to_bench, from_endpoint) = channel();
     let (to_endpoint, from_bench) = channel();
-    (Endpoint { to_bench, from_bench, now: 0, received: Vec::new() }, BenchEnd { from_endpoint, to_endpoint })
+    (Endpoint { to_bench, from_bench, now, received: Vec::new() }, BenchEnd { from_endpoint, to_endpoint })
 }
 
 fn over() -> BenchError {
@@ -198,6 +218,60 @@ impl Endpoint {
     pub fn register(&mut self, address: u64) -> Result<u64, BenchError> {
         match self.ask(Question::Register(address))? {
             ToEndpoint::Register(value) => Ok(value),
+            _ => Err(over()),
+        }
+    }
+
+    /// Begins to look for the first access that sees a fault, and to write down how the plant moves.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn look_out(&mut self, wanted: Sighting) -> Result<(), BenchError> {
+        self.ask(Question::LookOut(wanted)).map(|_| ())
+    }
+
+    /// The record so far, which then begins anew.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn record(&mut self) -> Result<Record, BenchError> {
+        match self.ask(Question::Record)? {
+            ToEndpoint::Record(record) => Ok(*record),
+            _ => Err(over()),
+        }
+    }
+
+    /// Goes on from here once for each job, `at_once` of them at a time, and gives what each returned. A job works at an
+    /// endpoint of its own, in a process of its own, so that it costs what it runs and no start; this run does not notice.
+    ///
+    /// # Errors
+    /// The run ended, or the system has no more processes to give.
+    pub fn branch(&mut self, jobs: Vec<Job>, at_once: usize) -> Result<Vec<Vec<u8>>, BenchError> {
+        self.to_bench.send(ToBench::Branch { jobs, at_once }).map_err(|_| over())?;
+        match self.from_bench.recv().map_err(|_| over())? {
+            ToEndpoint::Branched(results) => results.map_err(BenchError::Emulator),
+            _ => Err(over()),
+        }
+    }
+
+    /// How the plant truly moves now.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn motion(&mut self) -> Result<Motion, BenchError> {
+        match self.ask(Question::Motion)? {
+            ToEndpoint::Motion(motion) => Ok(motion),
+            _ => Err(over()),
+        }
+    }
+
+    /// Whether it was seen.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn seen(&mut self) -> Result<Option<Seen>, BenchError> {
+        match self.ask(Question::Seen)? {
+            ToEndpoint::Seen(seen) => Ok(seen),
             _ => Err(over()),
         }
     }

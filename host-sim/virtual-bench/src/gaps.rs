@@ -4,6 +4,7 @@
 //! with one fails. The one exception is checked here instead: the limits of the clocks in voltage scale 0.
 
 use crate::board::RigBoard;
+use crate::interference;
 use crate::part::Part;
 use rigless::mcu::Operate;
 use rigless::session::Session;
@@ -22,7 +23,8 @@ const SCALE_0_APB_HZ: u64 = 120_000_000;
 pub fn found(session: &Session<RigBoard>) -> Vec<String> {
     let mut lines = Vec::new();
     let within_scale_0 = within_scale_0(&session.board().part);
-    for access in session.unmapped() {
+    // What the bench itself sends the core to.
+    for access in session.unmapped().into_iter().filter(|access| access.address != interference::NOTHING) {
         lines.push(format!(
             "nothing answers at {:#010x} (pc {:#010x})",
             access.address, access.program_counter

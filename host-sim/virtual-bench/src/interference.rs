@@ -1,4 +1,4 @@
-//! Faults that reach into the chip: masked interrupts, locked DMA streams.
+//! Faults that reach into the chip: masked interrupts, locked DMA streams, handlers that hang or trap.
 //!
 //! Each is done over the bus or by code put beside the firmware's, so the firmware meets it as it would on silicon.
 
@@ -18,11 +18,53 @@ const FIRST_CONTROL: u64 = 0x10;
 const STREAM_STRIDE: u64 = 0x18;
 
 /// Where the code that masks interrupts lies: the end of SRAM3, which the firmware does not use.
-const STUB: u64 = 0x3004_7F00;
+pub(crate) const STUB: u64 = 0x3004_7F00;
+/// Where interrupts are masked in the code of [`masking_stub`].
+pub(crate) const MASKED_AT: u64 = STUB + 2 * 12;
 /// `TIMx_CNT`.
 const COUNTER: u64 = 0x24;
 /// Nanoseconds of one round of the stub's loop: two instructions.
 const ROUND_NS: u64 = 2 * 1_000_000_000 / crate::board::INSTRUCTIONS_PER_SECOND.get();
+
+/// An address where nothing answers.
+pub(crate) const NOTHING: u64 = 0xA000_0000;
+/// `ICSR` of the core, and the bit that pends the non-maskable interrupt (ARMv7-M B3.2.4).
+const ICSR: u64 = 0xE000_ED04;
+const NMI_PENDS: u64 = 1 << 31;
+
+/// What stands before a handler in place of [`masking_stub`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Obstacle {
+    /// All interrupts masked, and an endless loop.
+    HangMasked,
+    /// A read where nothing answers.
+    BusError,
+    /// The non-maskable interrupt, as the clock security system asks for it; the emulator's clock controller leaves that
+    /// line out (RM0433 8.5.3).
+    ClockFailure,
+}
+
+/// Puts code in front of the handler `original`, and gives the word for the interrupt's vector.
+pub(crate) fn obstacle(host: &mut dyn Host, original: u64, what: Obstacle) -> u64 {
+    let (code, words): (&[u16], Vec<u64>) = match what {
+        Obstacle::HangMasked => (&[0xB672, 0xE7FE], vec![]), // cpsid i; b .
+        // ldr r0, nothing; ldr r0, [r0]
+        Obstacle::BusError => (&[0x4800, 0x6800], vec![NOTHING]),
+        // ldr r0, icsr; ldr r1, pends; str r1, [r0]; dsb; ldr r0, original; bx r0; nop
+        Obstacle::ClockFailure => (
+            &[0x4803, 0x4904, 0x6001, 0xF3BF, 0x8F4F, 0x4803, 0x4700, 0xBF00],
+            vec![ICSR, NMI_PENDS, original | 1],
+        ),
+    };
+    // It is RAM the firmware leaves alone.
+    for (at, half) in (STUB..).step_by(2).zip(code) {
+        let _ = host.write(at, Width::W16, (*half).into());
+    }
+    for (at, word) in (STUB + 2 * code.len() as u64..).step_by(4).zip(words) {
+        let _ = host.write(at, Width::W32, word);
+    }
+    STUB | 1
+}
 
 /// Locks the streams up that serve USART3 without `TRBUFF` (ES0392 rev 15, 2.20.4): their requests are no longer
 /// served, `EN` stands and the counter stays. Says whether there was one.

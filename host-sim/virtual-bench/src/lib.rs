@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod board;
+pub mod branch;
 pub mod budget;
 pub mod campaign;
 pub mod cli;
@@ -25,5 +26,7 @@ pub mod record;
 pub mod rtt;
 pub mod serial;
 pub mod serve;
+pub mod sighting;
+pub mod soak;
 
 pub use driver::PERIOD;

@@ -43,6 +43,19 @@ pub struct Sensors {
     pub microvolt: [u32; 5],
 }
 
+/// How the plant truly moves, whatever its sensors show.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Motion {
+    /// Torques of M1 and M2, N·m.
+    pub torque_nm: [f64; 2],
+    /// Angle of the disc, rad.
+    pub disc_angle_rad: f64,
+    /// Speed of the disc, rad/s.
+    pub disc_speed_rad_s: f64,
+    /// Normal force, N.
+    pub normal_force_n: f64,
+}
+
 /// The plant behind the chip's pins, one control period at a time.
 pub trait PlantSide: Send + Sync {
     /// What it shows before anything moved.
@@ -53,6 +66,8 @@ pub trait PlantSide: Send + Sync {
     fn touch(&mut self, hand: Hand) {
         let _ = hand;
     }
+    /// How it moves, truly.
+    fn motion(&self) -> Motion;
     /// The same plant in the same state.
     fn duplicate(&self) -> Box<dyn PlantSide>;
 }
@@ -93,6 +108,12 @@ pub enum Action {
     Reference(Motor, ReferenceWire),
     /// An analogue input is held at a voltage in µV whatever the plant says, or is free again.
     AnalogueInput(usize, Option<u32>),
+    /// An analogue input stays at the voltage it has now.
+    AnalogueFrozen(usize),
+    /// The wire to an analogue input has a loose contact: by chance it is open in every second scan, or whole again.
+    AnalogueLoose(usize, bool),
+    /// An encoder counts so many on within a few microseconds, and goes on from there.
+    EncoderJump(Motor, u32),
     /// The converter starts no more scans, or does again.
     AdcStalled(bool),
     /// The next scan ends before its last channel.
@@ -124,6 +145,19 @@ pub enum Action {
     TrapTick,
     /// The handler of the link's DMA becomes an endless loop, until the next reset: threads starve, the tick goes on.
     HangThreads,
+    /// The same with all interrupts masked.
+    HangMasked,
+    /// The control tick begins with a read of an address where nothing answers, until the next reset.
+    BusError,
+    /// The 8 MHz stop, and the clock security system notices.
+    ClockFails,
+    /// A bit of memory turns over.
+    FlipBit {
+        /// Address of the byte.
+        address: u64,
+        /// The bit.
+        bit: u8,
+    },
 }
 
 /// The ±10 V wire from the amplifier to a drive.
@@ -176,6 +210,8 @@ pub struct Outside {
     pub healthy: [bool; 2],
     /// Voltages that hide the plant's.
     pub held_microvolt: [Option<u32>; 5],
+    /// Inputs whose wire has a loose contact.
+    pub loose: [bool; 5],
     /// Wires of the torque references.
     pub references: [ReferenceWire; 2],
     /// What else is wired wrongly.
@@ -240,6 +276,7 @@ impl Default for Outside {
             stop_pressed: false,
             healthy: [true; 2],
             held_microvolt: [None; 5],
+            loose: [false; 5],
             references: Default::default(),
             wiring: Wiring::default(),
         }

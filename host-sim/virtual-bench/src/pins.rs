@@ -23,6 +23,18 @@ impl Place {
         Self { port, number }
     }
 
+    /// Number of the pin's bit in the registers of its port.
+    #[must_use]
+    pub const fn bit(self) -> u8 {
+        self.number
+    }
+
+    /// Address of the port's input register, `GPIOx_IDR`.
+    #[must_use]
+    pub const fn input_register(self) -> u64 {
+        rigless::soc::stm32h743::generated::GPIOA.base + 0x400 * self.port_index() as u64 + 0x10
+    }
+
     const fn port_index(self) -> usize {
         self.port as usize - 'A' as usize
     }

@@ -1,7 +1,7 @@
 //! host-sim's plant behind the chip's pins.
 
 use crate::driver::PERIOD;
-use crate::outside::{DriveInputs, Hand, PlantSide, Sensors};
+use crate::outside::{DriveInputs, Hand, Motion, PlantSide, Sensors};
 use crate::part::Motor;
 use crate::part::encoder_timer::Edge;
 use host_sim::input_error::InputError;
@@ -64,6 +64,16 @@ impl PlantSide for HostPlant {
             Hand::PressM1(torque_nm) => self.plant.hands().m1_nm = torque_nm,
             Hand::LoadFriction(torque_nm) => self.plant.hands().friction_load_nm = torque_nm,
             Hand::LoadNormal(force_n) => self.plant.hands().normal_load_n = force_n,
+        }
+    }
+
+    fn motion(&self) -> Motion {
+        let truth = self.plant.truth();
+        Motion {
+            torque_nm: [truth.m1_torque_nm, truth.m2_torque_nm],
+            disc_angle_rad: truth.disc_angle_rad,
+            disc_speed_rad_s: truth.disc_speed_rad_s,
+            normal_force_n: truth.normal_force_n,
         }
     }
 

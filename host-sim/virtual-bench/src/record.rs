@@ -1,8 +1,11 @@
 //! What a run leaves behind, and what it keeps for runs that go on from it.
 
-use crate::outside::{DriveInputs, Outside, PlantSide, Sensors};
+use crate::outside::{DriveInputs, Motion, Outside, PlantSide, Sensors};
+use crate::sighting::Seen;
 use rigless::device::ResetCause;
 use rigless::session::Reset;
+use rigless::snapshot::Snapshot;
+use std::sync::{Mutex, OnceLock};
 
 /// A restart of the chip.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +31,10 @@ pub struct Record {
     pub instructions: u64,
     /// The state kept by the operator's wish.
     pub saved: Option<Saved>,
+    /// The first access that saw the fault the operator looked for.
+    pub seen: Option<Seen>,
+    /// How the plant moved at the end of each control period since the operator began to look, ns.
+    pub motion: Vec<(u64, Motion)>,
 }
 
 impl std::fmt::Debug for Record {
@@ -41,7 +48,9 @@ impl std::fmt::Debug for Record {
 
 /// The whole bench at one instant.
 pub struct Saved {
-    pub(crate) file: Vec<u8>,
+    /// Given up when it is first restored: the emulator's reading of it stays for good.
+    pub(crate) file: Mutex<Vec<u8>>,
+    pub(crate) read: OnceLock<Snapshot>,
     pub(crate) plant: Box<dyn PlantSide>,
     pub(crate) sensors: Sensors,
     pub(crate) outside: Outside,
@@ -77,6 +86,17 @@ impl Record {
                 other => format!("{other:?}"),
             },
         }));
+    }
+
+    /// The first instant from `from_ns` on at which the outputs are safe and stay so until `until_ns`.
+    #[must_use]
+    pub fn safe_from(&self, from_ns: u64, until_ns: u64) -> Option<u64> {
+        let before = self.outputs.partition_point(|(at, _)| *at < until_ns);
+        let outputs = self.outputs.get(..before).unwrap_or_default();
+        match outputs.iter().rposition(|(_, outputs)| !outputs.is_safe()) {
+            None => Some(from_ns),
+            Some(index) => outputs.get(index + 1).map(|(at, _)| (*at).max(from_ns)),
+        }
     }
 
     /// The first instant from `from_ns` on at which the outputs are safe and stay so to the end of the run.

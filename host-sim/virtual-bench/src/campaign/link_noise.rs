@@ -60,11 +60,5 @@ pub(super) fn verdict(firmware: &Firmware, running: &Saved, scratch: &Path) -> R
     if !outcome.record.restarts.is_empty() {
         problems.push(format!("it restarted: {:?}", outcome.record.restarts));
     }
-    Ok(Verdict {
-        name: "2 % of the bytes to the chip damaged",
-        known_ns: 0,
-        safe_ns: Some(0),
-        said,
-        problems,
-    })
+    Ok(Verdict { name: "2 % of the bytes to the chip damaged", said, problems })
 }

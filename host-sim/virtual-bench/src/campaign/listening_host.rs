@@ -10,11 +10,34 @@ use rig_link::telemetry::{Health, TelemetryRow};
 const ALIVE_NS: u64 = 100_000_000;
 /// Longest wait for an answer.
 const PATIENCE_NS: u64 = 1_000_000_000;
+/// The shortest request: its number, its kind, the checksum, and what frames them.
+const LEAST_FRAME: usize = 8;
+
+/// A hash over everything heard, FNV-1a.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Heard(pub u64);
+
+impl Default for Heard {
+    fn default() -> Self {
+        Self(0xCBF2_9CE4_8422_2325)
+    }
+}
+
+impl Heard {
+    /// Takes bytes.
+    pub fn add(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3);
+        }
+    }
+}
 
 /// The host.
 #[derive(Debug)]
 pub struct ListeningHost {
     client: Client,
+    /// Everything heard.
+    pub heard: Heard,
     alive_at: u64,
     /// Sends signs of life.
     pub lively: bool,
@@ -39,6 +62,7 @@ impl ListeningHost {
     pub fn new() -> Self {
         Self {
             client: Client::new(),
+            heard: Heard::default(),
             alive_at: 0,
             lively: true,
             events: Vec::new(),
@@ -63,7 +87,9 @@ impl ListeningHost {
                 endpoint.send(&outgoing)?;
             }
             let next = until_ns.min(if self.lively { self.alive_at } else { until_ns });
-            self.client.receive(&endpoint.receive(next)?);
+            let bytes = endpoint.receive(next)?;
+            self.heard.add(&bytes);
+            self.client.receive(&bytes);
             while let Some(message) = self.client.next_message() {
                 match message {
                     Message::Event(event) => self.events.push(event),
@@ -76,9 +102,10 @@ impl ListeningHost {
         Ok(())
     }
 
-    /// Asks, and does not wait for the answer.
-    pub fn send(&mut self, command: &Command) {
+    /// Asks, and does not wait for the answer. Gives the bytes that takes at least.
+    pub fn send(&mut self, command: &Command) -> usize {
         self.client.request(command.clone());
+        LEAST_FRAME
     }
 
     /// Asks, and waits for the answer; asks again where there is none.

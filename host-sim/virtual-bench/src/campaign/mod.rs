@@ -1,83 +1,200 @@
-//! The fault campaign: what can go wrong on the rig is made to go wrong, and the firmware must end it.
+//! The fault campaign: what can go wrong on the rig is made to go wrong, and the firmware must end it or bear it.
 //!
-//! One run of fig20 is brought to the middle of its load phase, both loops at work, and kept; each fault starts
-//! from there. Asked each time: are the outputs safe within two control periods of the moment the fault can be known,
-//! do they stay so with nobody at the rig, is the reason in the firmware's log and said over the link. When a
-//! fault "can be known" follows from the firmware's own settings (how many samples in a row, which time-out) or from
-//! the watchdog's, and is written down with each fault.
+//! The rig is brought into a state; from instants drawn by a seed the run branches once for each fault. Asked each time: did
+//! the fault act (`sighting.rs`), are the outputs safe within two control periods of the moment it can be known, do they
+//! stay so with nobody at the rig, is the reason in the firmware's log and said over the link, is the rig refused while
+//! the fault is there, and does it come back when it is put right. A run whose fault nothing saw does not count.
 
-mod faults;
+pub mod case;
+pub mod faults;
 mod link_noise;
 pub mod listening_host;
 mod settings_cut;
 pub mod states;
+pub mod table;
 
+use crate::bench;
+use crate::branch::Job;
+use crate::defmt_log;
 use crate::driver::PERIOD;
 use crate::elf::Firmware;
+use crate::endpoint::Endpoint;
 use crate::error::BenchError;
+use crate::outside::Action;
+use crate::soak::Chance;
+use case::{Common, Row};
+use defmt_decoder::Table;
+use faults::FaultCase;
+use listening_host::ListeningHost;
+use serde::{Deserialize, Serialize};
+use states::State;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Outputs are safe so long after the moment the fault can be known.
 pub const PROMISED_NS: u64 = 2 * PERIOD;
 
-/// What became of one fault.
+/// What is run.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Instants in each state.
+    pub instants: usize,
+    /// Where their drawing begins.
+    pub seed: u64,
+    /// Bits of the control state that are flipped at each instant: many of them do nothing.
+    pub flips: usize,
+    /// Branches at a time.
+    pub at_once: usize,
+    /// The states.
+    pub states: Vec<State>,
+    /// Only faults whose name has this in it.
+    pub only: Option<String>,
+}
+
+impl Plan {
+    /// The whole campaign.
+    #[must_use]
+    pub fn whole() -> Self {
+        Self { instants: 20, seed: 1, flips: 4, at_once: 2, states: State::ALL.to_vec(), only: None }
+    }
+
+    /// Each fault once in each state.
+    #[must_use]
+    pub fn part(seed: u64) -> Self {
+        Self { instants: 1, seed, ..Self::whole() }
+    }
+}
+
+/// Length of the time from which the instants are drawn.
+const DRAWN_FROM_PERIODS: u64 = 1000;
+
+/// One run: which, and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// The fault.
+    pub fault: String,
+    /// The state.
+    pub state: State,
+    /// When it was made, ns from power-on.
+    pub at_ns: u64,
+    /// What became of it.
+    pub row: Row,
+}
+
+/// Runs the campaign; `tell` hears the runs as they are done, and how many there will be.
+///
+/// # Errors
+/// The bench itself failed. A firmware that fails a fault is no error: see [`Row::problems`].
+pub fn run(
+    firmware: &Firmware,
+    plan: &Plan,
+    tell: &mut (dyn FnMut(&[Run], usize) + Send),
+) -> Result<Vec<Run>, BenchError> {
+    let wanted = |case: &FaultCase| plan.only.as_ref().is_none_or(|only| case.name.contains(only.as_str()));
+    let faults: Arc<Vec<FaultCase>> = Arc::new(faults::all().into_iter().filter(wanted).collect());
+    let table = Arc::new(defmt_log::table(&firmware.bytes)?);
+    let chip = Chip { faults: Arc::clone(&faults), table, control_state: firmware.control_state };
+    let each = faults.iter().map(|case| if case.is_flip { plan.flips } else { 1 }).sum::<usize>();
+    let total = each * plan.instants * plan.states.len();
+    let mut runs = Vec::new();
+    for state in &plan.states {
+        let outcome = bench::run(firmware, Box::new(state.plant()?), |endpoint| {
+            in_state(endpoint, *state, plan, &chip, &mut |new| tell(new, total))
+        })?;
+        runs.extend(outcome.operator);
+    }
+    Ok(runs)
+}
+
+/// What the branches share.
+struct Chip {
+    faults: Arc<Vec<FaultCase>>,
+    table: Arc<Table>,
+    control_state: (u64, u64),
+}
+
+fn in_state(
+    endpoint: &mut Endpoint,
+    state: State,
+    plan: &Plan,
+    chip: &Chip,
+    tell: &mut dyn FnMut(&[Run]),
+) -> Result<Vec<Run>, BenchError> {
+    state.reach(endpoint)?;
+    let mut listener = ListeningHost::new();
+    // The host of before is gone: a few periods of this one's company first.
+    let begin = endpoint.now_ns() + 5_000_000;
+    let mut chance = Chance(plan.seed ^ (state as u64 + 1) << 32);
+    let mut instants: Vec<u64> =
+        (0..plan.instants).map(|_| begin + chance.below(DRAWN_FROM_PERIODS) * PERIOD).collect();
+    instants.sort_unstable();
+    let mut runs = Vec::new();
+    for instant in instants {
+        listener.listen(endpoint, instant)?;
+        let at_ns = endpoint.now_ns();
+        let twin = match endpoint
+            .branch(vec![Box::new(|endpoint: &mut Endpoint| encoded(&case::twin(endpoint)))], 1)?
+            .first()
+        {
+            Some(bytes) => decoded(bytes)?,
+            None => None,
+        };
+        let mut names = Vec::new();
+        let mut jobs: Vec<Job> = Vec::new();
+        for case in chip.faults.iter() {
+            for _ in 0..if case.is_flip { plan.flips } else { 1 } {
+                let mut case = case.clone();
+                if case.is_flip {
+                    let (start, length) = chip.control_state;
+                    let (offset, bit) = (chance.below(length), chance.below(8));
+                    case.actions = vec![Action::FlipBit { address: start + offset, bit: bit as u8 }];
+                }
+                names.push(case.name.clone());
+                let table = Arc::clone(&chip.table);
+                jobs.push(Box::new(move |endpoint: &mut Endpoint| {
+                    let mut row = case::run(endpoint, &case, state, &Common { table: &table, twin });
+                    if case.is_flip && !row.problems.is_empty() {
+                        row.problems.push(format!("{:?}", case.actions));
+                    }
+                    encoded(&row)
+                }));
+            }
+        }
+        let done = runs.len();
+        for (bytes, fault) in endpoint.branch(jobs, plan.at_once)?.iter().zip(names) {
+            runs.push(Run { fault, state, at_ns, row: decoded(bytes)? });
+        }
+        tell(&runs[done..]);
+    }
+    Ok(runs)
+}
+
+fn encoded<T: Serialize>(value: &T) -> Vec<u8> {
+    // What cannot be written cannot be read either, and that is reported.
+    serde_json::to_vec(value).unwrap_or_default()
+}
+
+fn decoded<T: for<'a> Deserialize<'a>>(bytes: &[u8]) -> Result<T, BenchError> {
+    serde_json::from_slice(bytes).map_err(|error| BenchError::Emulator(format!("a branch's result: {error}")))
+}
+
+/// What became of one of the longer trials, which are no faults of an instant.
 #[derive(Debug, Clone)]
 pub struct Verdict {
-    /// The fault in words.
+    /// The trial in words.
     pub name: &'static str,
-    /// From the fault to the moment it can be known, ns.
-    pub known_ns: u64,
-    /// From the fault to safe outputs that stay safe, ns.
-    pub safe_ns: Option<u64>,
-    /// What the firmware said it was.
+    /// What the firmware did.
     pub said: String,
     /// Everything that was not as it must be.
     pub problems: Vec<String>,
 }
 
-impl Verdict {
-    /// Whether all was as it must be.
-    #[must_use]
-    pub fn held(&self) -> bool {
-        self.problems.is_empty()
-    }
-}
-
-/// Runs the whole campaign. `scratch` is a folder for temporary files; `tell` hears each verdict.
+/// The longer trials: noise on the line for seconds, power cuts while a setting is stored. `scratch` is a folder for
+/// temporary files.
 ///
 /// # Errors
-/// The bench itself failed. A firmware that fails a fault is no error: see [`Verdict::problems`].
-pub fn run(
-    firmware: &Firmware,
-    scratch: &Path,
-    tell: &mut dyn FnMut(&Verdict),
-) -> Result<Vec<Verdict>, BenchError> {
-    let mut verdicts = Vec::new();
-    let mut add = |verdict: Verdict| {
-        tell(&verdict);
-        verdicts.push(verdict);
-    };
-    let running = states::State::Sliding.kept(firmware)?;
-    for case in faults::all() {
-        add(faults::verdict(firmware, &running, scratch, &case)?);
-    }
-    add(link_noise::verdict(firmware, &running, scratch)?);
-    add(settings_cut::verdict(firmware, scratch)?);
-    Ok(verdicts)
-}
-
-/// The verdicts as a table.
-#[must_use]
-pub fn table(verdicts: &[Verdict]) -> String {
-    let ms = |nanos: u64| format!("{:.2}", nanos as f64 * 1e-6);
-    let mut text =
-        format!("{:<38} {:>9} {:>9}  {}\n", "fault", "known ms", "safe ms", "what the firmware said");
-    for verdict in verdicts {
-        let safe = verdict.safe_ns.map_or_else(|| "never".to_owned(), ms);
-        text += &format!("{:<38} {:>9} {safe:>9}  {}\n", verdict.name, ms(verdict.known_ns), verdict.said);
-        for problem in &verdict.problems {
-            text += &format!("    FAILED: {problem}\n");
-        }
-    }
-    text
+/// The bench itself failed.
+pub fn trials(firmware: &Firmware, scratch: &Path) -> Result<Vec<Verdict>, BenchError> {
+    let running = State::Sliding.kept(firmware)?;
+    Ok(vec![link_noise::verdict(firmware, &running, scratch)?, settings_cut::verdict(firmware, scratch)?])
 }

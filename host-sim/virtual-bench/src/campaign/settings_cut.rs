@@ -74,7 +74,7 @@ pub(super) fn verdict(firmware: &Firmware, scratch: &Path) -> Result<Verdict, Be
     }
     let said =
         format!("{runs} cuts: the old value {olds} times, else the new one; a new value taken each time");
-    Ok(Verdict { name: "power cut while a setting is stored", known_ns: 0, safe_ns: Some(0), said, problems })
+    Ok(Verdict { name: "power cut while a setting is stored", said, problems })
 }
 
 /// The rig disabled, with one setting stored.

@@ -3,16 +3,26 @@
 use super::listening_host::ListeningHost;
 use crate::bench;
 use crate::elf::Firmware;
+use crate::endpoint::Endpoint;
 use crate::endpoint_link::perform;
 use crate::error::BenchError;
 use crate::experiment::{ArmSwitch, Request, boot};
+use crate::outside::Action;
+use crate::plant_side::HostPlant;
 use crate::record::Saved;
+use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::link::client::Client;
 use host_sim::link::run_experiment::{RunExperiment, RunOptions};
 use rig_link::message::{Answer, Command};
+use serde::{Deserialize, Serialize};
+
+/// Tick of the experiment at which the state is reached: its last step was 0.3 s before.
+const TAKEN_AT: u32 = 6_000;
+/// Distance of two rows of telemetry in all of them.
+const EVERY_TICKS: u16 = 10;
 
 /// What the rig does when the fault comes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum State {
     /// Drives off.
     Idle,
@@ -48,15 +58,21 @@ impl State {
         !matches!(self, Self::Idle)
     }
 
-    /// The experiment that leads there, and at which tick of it.
-    const fn on_the_way(self) -> Option<(&'static str, u32)> {
+    /// The experiment that leads there: its second halves are what the rig does, and the state is taken from them.
+    const fn on_the_way(self) -> Option<&'static str> {
         match self {
             Self::Idle | Self::Armed => None,
-            // The speed step comes at 3.5 s, the load step at 4 s.
-            Self::Pressing => Some(("fig20", 10_000)),
-            Self::Sliding => Some(("fig20", 45_000)),
-            // The torque step comes at 4 s.
-            Self::Torque => Some(("fig23", 41_000)),
+            Self::Pressing => {
+                Some("[[m1]]\nstart_s = 0.2\ntorque_fraction = 0.4\n[[m2]]\nstart_s = 0.0\nspeed_rpm = 0.0\n")
+            }
+            Self::Sliding => Some(
+                "[[m1]]\nstart_s = 0.2\ntorque_fraction = 0.4\n[[m2]]\nstart_s = 0.0\nspeed_rpm = 0.0\n\
+                 [[m2]]\nstart_s = 0.1\nspeed_rpm = 30.0\n",
+            ),
+            Self::Torque => Some(
+                "[[m1]]\nstart_s = 0.2\ntorque_fraction = 0.6\n[[m2]]\nstart_s = 0.0\ntorque_fraction = 0.0\n\
+                 [[m2]]\nstart_s = 0.3\ntorque_fraction = 0.6\n",
+            ),
         }
     }
 
@@ -65,70 +81,113 @@ impl State {
     /// # Errors
     /// The firmware does not get there.
     pub fn kept(self, firmware: &Firmware) -> Result<Saved, BenchError> {
+        let outcome = bench::run(firmware, Box::new(self.plant()?), |endpoint| {
+            self.reach(endpoint)?;
+            endpoint.snapshot()
+        })?;
+        outcome.record.saved.ok_or_else(|| BenchError::Emulator("nothing was kept".to_owned()))
+    }
+
+    /// The plant it is reached with.
+    ///
+    /// # Errors
+    /// The assumed rig's files are damaged.
+    pub fn plant(self) -> Result<HostPlant, BenchError> {
+        Request::assumed("fig20")?.plant()
+    }
+
+    /// Brings the rig there from power-on, through a fault and its clearing: the emulator has then translated what the
+    /// firmware does at a fault, and a run that branches off later need not.
+    ///
+    /// # Errors
+    /// The firmware does not get there.
+    pub fn reach(self, endpoint: &mut Endpoint) -> Result<(), BenchError> {
+        boot(endpoint)?;
+        through_a_fault(endpoint)?;
         match self.on_the_way() {
-            Some((experiment, tick)) => during(firmware, experiment, tick),
-            None => before_any(firmware, self == Self::Armed),
+            Some(motion) => during(endpoint, motion),
+            None => before_any(endpoint, self == Self::Armed),
         }
     }
 }
 
+/// Arms, has the emergency stop pressed, and clears that.
+fn through_a_fault(endpoint: &mut Endpoint) -> Result<(), BenchError> {
+    let mut listener = ListeningHost::new();
+    accepted(endpoint, &mut listener, &Command::Telemetry { every_ticks: EVERY_TICKS })?;
+    armed(endpoint, &mut listener)?;
+    endpoint.act(Action::EmergencyStop(true))?;
+    listener.listen(endpoint, endpoint.now_ns() + 20_000_000)?;
+    listener.ask(endpoint, &Command::Arm)?;
+    endpoint.act(Action::EmergencyStop(false))?;
+    endpoint.act(Action::ArmSwitch(false))?;
+    listener.listen(endpoint, endpoint.now_ns() + 20_000_000)?;
+    accepted(endpoint, &mut listener, &Command::ClearFault)?;
+    listener.ask(endpoint, &Command::CrashRecord)?;
+    listener.ask(endpoint, &Command::SettingGet { key: 143 })?;
+    Ok(())
+}
+
+/// Turns the switch on and arms.
+fn armed(endpoint: &mut Endpoint, listener: &mut ListeningHost) -> Result<(), BenchError> {
+    let mut switch = ArmSwitch::default();
+    while !switch.is_on() {
+        switch.turn(endpoint)?;
+        listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+    }
+    // A line permits only when it did so for a while.
+    listener.listen(endpoint, endpoint.now_ns() + 10_000_000)?;
+    accepted(endpoint, listener, &Command::Arm)
+}
+
+fn accepted(
+    endpoint: &mut Endpoint,
+    listener: &mut ListeningHost,
+    command: &Command,
+) -> Result<(), BenchError> {
+    match listener.ask(endpoint, command)? {
+        Answer::Done => Ok(()),
+        other => Err(BenchError::Rig(format!("{command:?}: {other:?}"))),
+    }
+}
+
 /// Switched on, and armed if asked for.
-fn before_any(firmware: &Firmware, armed: bool) -> Result<Saved, BenchError> {
-    let outcome = bench::run(firmware, Box::new(Request::assumed("fig20")?.plant()?), |endpoint| {
-        boot(endpoint)?;
-        let mut listener = ListeningHost::new();
-        if armed {
-            let mut switch = ArmSwitch::default();
-            while !switch.is_on() {
-                switch.turn(endpoint)?;
-                listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
-            }
-            match listener.ask(endpoint, &Command::Arm)? {
-                Answer::Done => {}
-                other => return Err(BenchError::Rig(format!("it does not arm: {other:?}"))),
-            }
-        }
-        listener.listen(endpoint, endpoint.now_ns() + 50_000_000)?;
-        endpoint.snapshot()
-    })?;
-    outcome.record.saved.ok_or_else(nothing)
+fn before_any(endpoint: &mut Endpoint, arm: bool) -> Result<(), BenchError> {
+    let mut listener = ListeningHost::new();
+    if arm {
+        armed(endpoint, &mut listener)?;
+    }
+    listener.listen(endpoint, endpoint.now_ns() + 50_000_000)
 }
 
 /// In the middle of an experiment.
-fn during(firmware: &Firmware, experiment: &str, tick: u32) -> Result<Saved, BenchError> {
-    let request = Request::assumed(experiment)?;
-    let experiment = request.experiment.for_core(&request.rig)?;
-    let outcome = bench::run(firmware, Box::new(request.plant()?), |endpoint| {
-        boot(endpoint)?;
-        let mut client = Client::new();
-        let mut switch = ArmSwitch::default();
-        let mut kept = false;
-        let mut procedure = RunExperiment::new(experiment, RunOptions::default());
-        // Whatever ends the procedure early is said below: nothing was kept.
-        let ended = perform(endpoint, &mut client, &mut procedure, |endpoint, _, procedure| {
-            if procedure.wants_arm_switch() {
-                switch.turn(endpoint)?;
-            }
-            if procedure.progress_ticks() >= tick {
-                endpoint.snapshot()?;
-                kept = true;
-                return Err(BenchError::Rig("kept".to_owned()));
-            }
-            Ok(())
-        });
-        match ended {
-            Err(_) if kept => Ok(()),
-            Err(error) => Err(error),
-            Ok(run) => Err(BenchError::Rig(format!(
-                "{}: it ended early: {:?}",
-                request.experiment.name,
-                run.fault_words()
-            ))),
+fn during(endpoint: &mut Endpoint, motion: &str) -> Result<(), BenchError> {
+    let request = Request::assumed("fig20")?;
+    let head = "name = \"campaign\"\ntitle = \"A state of the campaign\"\nduration_s = 60.0\nseed = 1\n\
+                log_rate_hz = 1000\n[[m1]]\nstart_s = 0.0\ntorque_fraction = 0.055\n";
+    let experiment =
+        ExperimentFile::parse("campaign.toml", &format!("{head}{motion}"))?.for_core(&request.rig)?;
+    let mut client = Client::new();
+    let mut switch = ArmSwitch::default();
+    let mut there = false;
+    let options = RunOptions { every_ticks: EVERY_TICKS, ..RunOptions::default() };
+    let mut procedure = RunExperiment::new(experiment, options);
+    // Whatever ends the procedure early is said below.
+    let ended = perform(endpoint, &mut client, &mut procedure, |endpoint, _, procedure| {
+        if procedure.wants_arm_switch() {
+            switch.turn(endpoint)?;
         }
-    })?;
-    outcome.record.saved.ok_or_else(nothing)
-}
-
-fn nothing() -> BenchError {
-    BenchError::Emulator("nothing was kept".to_owned())
+        if procedure.progress_ticks() >= TAKEN_AT {
+            there = true;
+            return Err(BenchError::Rig("there".to_owned()));
+        }
+        Ok(())
+    });
+    match ended {
+        Err(_) if there => Ok(()),
+        Err(error) => Err(error),
+        Ok(run) => {
+            Err(BenchError::Rig(format!("on the way to a state it ended early: {:?}", run.fault_words())))
+        }
+    }
 }

@@ -82,6 +82,8 @@ pub struct TriggeredAdc {
     converted: u32,
     started: u64,
     ignored: u64,
+    /// Scans that a fault kept from starting or cut short.
+    spoilt: u64,
 }
 
 impl TriggeredAdc {
@@ -99,6 +101,7 @@ impl TriggeredAdc {
             converted: 0,
             started: 0,
             ignored: 0,
+            spoilt: 0,
         }
     }
 
@@ -126,6 +129,12 @@ impl TriggeredAdc {
         (self.started, self.ignored)
     }
 
+    /// Scans that a fault kept from starting or cut short.
+    #[must_use]
+    pub fn spoilt(&self) -> u64 {
+        self.spoilt
+    }
+
     fn disarm(&mut self) {
         self.external = 0;
         self.configured = [0; CONFIGURATION.len()];
@@ -141,7 +150,11 @@ impl TriggeredAdc {
 
     fn trigger(&mut self, source: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let listening = self.armed && self.external & EXTSEL == source << EXTSEL_SHIFT;
-        if !listening || self.stalled {
+        if !listening {
+            return;
+        }
+        if self.stalled {
+            self.spoilt += 1;
             return;
         }
         if self.converting {
@@ -211,6 +224,7 @@ impl TriggeredAdc {
         self.converted += 1;
         if self.converted >= CUT_AFTER {
             self.cut = false;
+            self.spoilt += 1;
             let control = registers.get(Register::Cr) | ADSTP;
             registers.set(Register::Cr, control);
             self.adc.write(Register::Cr, control, registers, context);

@@ -117,6 +117,7 @@ const fn filter_ns(field: u64) -> u64 {
 pub struct EncoderTimer {
     timer: Tim<General>,
     edges: VecDeque<Edge>,
+    last_count: i64,
     turned: VecDeque<Turned>,
     /// Levels the encoder drives.
     lines: [bool; 2],
@@ -129,6 +130,8 @@ pub struct EncoderTimer {
     /// Levels the timer's inputs were last given.
     driven: [Option<bool>; 2],
     stuck: [Option<bool>; 2],
+    /// Some line at the pins was not what the encoder drives.
+    deviated: bool,
 }
 
 impl EncoderTimer {
@@ -136,6 +139,7 @@ impl EncoderTimer {
         Self {
             timer: Tim::new(timer),
             edges: VecDeque::new(),
+            last_count: 0,
             turned: VecDeque::new(),
             lines: [false; 2],
             disturbed: [false; 2],
@@ -144,17 +148,31 @@ impl EncoderTimer {
             filters: 0,
             driven: [None; 2],
             stuck: [None; 2],
+            deviated: false,
         }
+    }
+
+    /// Where the encoder is by the last edge given.
+    #[must_use]
+    pub fn last_count(&self) -> i64 {
+        self.last_count
     }
 
     /// Adds an edge; edges are given in the order of time.
     pub fn push(&mut self, edge: Edge) {
+        self.last_count = edge.count;
         self.edges.push_back(edge);
     }
 
     /// Holds `line` at `level` whatever the encoder does, or lets it go with `None`.
     pub fn stick(&mut self, line: Line, level: Option<bool>) {
         self.stuck[line as usize] = level;
+    }
+
+    /// Whether a line at the pins was ever not what the encoder drives.
+    #[must_use]
+    pub fn deviated(&self) -> bool {
+        self.deviated
     }
 
     /// Swaps A and B, or puts them right.
@@ -205,6 +223,7 @@ impl EncoderTimer {
     fn feel(&mut self, at: VirtualNanos) {
         for line in [Line::A, Line::B] {
             let level = self.level(line);
+            self.deviated |= level != self.lines[line as usize];
             let input = &mut self.inputs[line as usize];
             if input.level != level {
                 (input.level, input.since) = (level, at);

@@ -53,6 +53,7 @@ struct Slots {
     tim6: usize,
     encoders: [usize; 2],
     usart3: usize,
+    rcc: usize,
 }
 
 /// The part.
@@ -99,6 +100,7 @@ impl Part {
                 bus.slot(Motor::M2.encoder_timer().instance)?,
             ],
             usart3: bus.slot("USART3")?,
+            rcc: bus.slot("RCC")?,
         };
         Ok(Self {
             soc,
@@ -109,6 +111,16 @@ impl Part {
             encoders: Motor::ALL.map(|motor| EncoderTimer::new(motor.encoder_timer())),
             slots,
         })
+    }
+
+    /// The 8 MHz stop, and the clock security system notices; its interrupt the emulator leaves out.
+    pub fn fail_crystal(&mut self, at: VirtualNanos) {
+        // The model and its registers are lent apart from each other only while the model is taken out.
+        let Ok(mut aside) = Stm32h743::new() else { return };
+        std::mem::swap(&mut aside.rcc, &mut self.soc.rcc);
+        let (registers, mut context) = self.soc.bus_mut().drive(at, self.slots.rcc);
+        aside.rcc.fail_hse(registers, &mut context);
+        std::mem::swap(&mut aside.rcc, &mut self.soc.rcc);
     }
 
     /// Asks for the part's supply to be cut or given back.

@@ -12,6 +12,7 @@ mod interrupted;
 mod runs;
 mod serve;
 mod silicon;
+mod soak;
 mod upload;
 
 use std::sync::OnceLock;
