@@ -75,6 +75,8 @@ pub(super) fn run(endpoint: &mut Endpoint, case: &FaultCase, state: State, commo
 pub(super) fn twin(endpoint: &mut Endpoint) -> Option<(u64, u64)> {
     let mut listener = ListeningHost::new();
     let until = endpoint.now_ns() + COMPARED_NS;
+    // What the outputs did before is no part of it.
+    endpoint.record().ok()?;
     listener.listen(endpoint, until).ok()?;
     let record = endpoint.record().ok()?;
     Some((hash_of_outputs(&record, until), listener.heard.0))
@@ -99,7 +101,6 @@ fn attempt(
     let outputs_now = endpoint.outputs()?;
     endpoint.record()?;
     let mut watched = watch(endpoint, case, state)?;
-    watched.record.outputs.insert(0, (watched.at_ns, outputs_now));
     let expect = case.expect(state);
     row.seen = match (&watched.seen, case.is_flip) {
         (Some(seen), _) => Some((seen.at_ns.saturating_sub(watched.at_ns), seen.what.clone())),
@@ -111,6 +112,8 @@ fn attempt(
         }
         (None, false) => None,
     };
+    // Only now: the twin has none of before either.
+    watched.record.outputs.insert(0, (watched.at_ns, outputs_now));
     let seen_at = watched.at_ns + row.seen.as_ref().map_or(0, |(after, _)| *after);
     let Watched { at_ns, until_ns, ref listener, ref record, .. } = watched;
     let mut latched: Vec<u8> = listener
