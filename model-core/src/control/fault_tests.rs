@@ -208,6 +208,31 @@ fn a_value_that_is_not_a_number_makes_safe_in_its_tick() {
 }
 
 #[test]
+fn an_input_that_freezes_is_found_within_two_windows() {
+    const WINDOW: u32 = 250;
+    let mut settings = ControlSettings::default();
+    settings.timing.adc_frozen_ticks = WINDOW;
+    let mut bench = Bench::with(&settings).running(&steady(0.5, M2Mode::Speed, 3.1, 20.0));
+    bench.run(0.5);
+    let mut held = None;
+    let freeze = move |s: &mut Samples| {
+        s.adc.friction_bridge = *held.get_or_insert(s.adc.friction_bridge);
+    };
+    let found = ticks_to_fault(&mut bench, case(Fault::AnalogueFrozen, 2 * WINDOW as usize, freeze));
+    assert!(found >= WINDOW as usize, "{found}");
+    comes_back_only_by_hand(&mut bench, Fault::AnalogueFrozen);
+}
+
+#[test]
+fn a_bit_of_the_mode_that_turns_over_makes_safe_in_its_tick() {
+    let mut bench = running_at_30_rpm();
+    bench.state.flip_bit_of_mode(0);
+    let outputs = bench.tick();
+    assert!(outputs.is_safe() && outputs.record.fault == Some(Fault::StateCorrupt), "{:?}", outputs.record);
+    comes_back_only_by_hand(&mut bench, Fault::StateCorrupt);
+}
+
+#[test]
 fn what_is_found_at_the_start_is_latched_after_the_self_check() {
     for (restart, intact, fault) in [
         (Restart::Watchdog, true, Fault::WatchdogReset),
@@ -230,6 +255,7 @@ fn what_is_found_at_the_start_is_latched_after_the_self_check() {
 fn every_fault_is_raised_by_one_of_these_tests() {
     let mut raised: Vec<Fault> = cases_at_speed().iter().map(|case| case.fault).collect();
     raised.extend([Fault::M1EncoderNoCounts, Fault::M2EncoderNoCounts, Fault::CalculationInvalid]);
+    raised.extend([Fault::AnalogueFrozen, Fault::StateCorrupt]);
     raised.extend([Fault::WatchdogReset, Fault::Panic, Fault::HardFault, Fault::SettingsCorrupt]);
     raised.sort_by_key(|fault| fault.number());
     assert_eq!(raised, Fault::ALL);
@@ -241,7 +267,7 @@ fn numbers_of_faults_limits_and_reasons_are_stable_and_come_back() {
     let faults: Vec<u8> = Fault::ALL.iter().map(|x| x.number()).collect();
     assert_eq!(faults[..5], [1, 2, 3, 4, 5]);
     assert_eq!(faults[5..17], [8, 9, 10, 11, 12, 13, 16, 17, 18, 19, 20, 21]);
-    assert_eq!(faults[17..], [24, 25, 26, 27, 28, 29, 32, 33, 36, 37, 38, 39, 40, 41, 42, 43]);
+    assert_eq!(faults[17..], [24, 25, 26, 27, 28, 29, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42, 43, 44]);
     assert!(Limit::ALL.iter().map(|x| x.number()).eq(1..=10));
     assert!(Reason::ALL.iter().map(|x| x.number()).eq(1..=11));
     assert!(Refusal::ALL.iter().map(|x| x.number()).eq(1..=12));

@@ -296,6 +296,15 @@ impl Supervisor {
     pub(crate) fn mode(&self) -> Mode {
         self.mode.get().unwrap_or(Mode::Fault)
     }
+    /// Turns one bit of the mode in memory over.
+    #[cfg(test)]
+    pub(crate) fn flip_bit_of_mode(&mut self, bit: u32) {
+        if bit < 8 {
+            self.mode.number ^= 1 << bit;
+        } else {
+            self.mode.complement ^= 1 << (bit - 8);
+        }
+    }
     pub(crate) fn first_fault(&self) -> Option<Fault> {
         self.first
     }
@@ -322,11 +331,7 @@ mod tests {
                 let mut supervisor = Supervisor::new(Restart::Ordinary, true);
                 let mut events = EventQueue::default();
                 supervisor.mode = KeptMode::new(*from);
-                if bit < 8 {
-                    supervisor.mode.number ^= 1 << bit;
-                } else {
-                    supervisor.mode.complement ^= 1 << (bit - 8);
-                }
+                supervisor.flip_bit_of_mode(bit);
                 assert!(!supervisor.mode().is_live(), "{from:?}, bit {bit}");
                 supervisor.step(&TIMING, QUIET, 1, &mut events);
                 assert_eq!(supervisor.mode(), Mode::Fault, "{from:?}, bit {bit}");

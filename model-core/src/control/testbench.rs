@@ -142,6 +142,20 @@ impl Bench {
         }
     }
 
+    /// Codes of noise, where frozen inputs are watched for: this rig's sensors are else as quiet as frozen ones.
+    fn add_noise(&self, scan: &mut AdcScan) {
+        let noise = (self.records.len() % 3) as u16;
+        for code in [
+            &mut scan.friction_bridge,
+            &mut scan.normal_bridge,
+            &mut scan.m1_torque,
+            &mut scan.m2_torque,
+            &mut scan.supply,
+        ] {
+            *code += noise;
+        }
+    }
+
     /// Runs for a time and gives the last outputs.
     pub(super) fn run(&mut self, seconds: f64) -> Outputs {
         let mut last = None;
@@ -161,6 +175,9 @@ impl Bench {
             {
                 *code = 0_u16.wrapping_sub(*code);
             }
+        }
+        if self.config.settings.timing.adc_frozen_ticks > 0 {
+            self.add_noise(&mut samples.adc);
         }
         if let Some(tamper) = &mut self.tamper {
             tamper(&mut samples);

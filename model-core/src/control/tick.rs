@@ -183,6 +183,11 @@ impl ControlState {
         }
     }
 
+    #[cfg(test)]
+    pub(super) fn flip_bit_of_mode(&mut self, bit: u32) {
+        self.supervisor.flip_bit_of_mode(bit);
+    }
+
     /// Mode of the supervisor.
     #[must_use]
     pub fn mode(&self) -> Mode {
