@@ -75,6 +75,12 @@ impl Encoder {
         }
     }
 
+    /// Whether a position counted by one is one of the other.
+    pub(crate) fn counts_like(&self, other: &Self) -> bool {
+        (self.unused_bits, self.reversed, self.counts_per_rev)
+            == (other.unused_bits, other.reversed, other.counts_per_rev)
+    }
+
     /// Takes one reading of the counter. Where the time since the last one is not `regular`, one period, the step says
     /// nothing of the speed: it counts, and is no jump.
     pub(crate) fn step(&self, state: &mut EncoderState, raw: u32, regular: bool) -> EncoderStep {

@@ -223,6 +223,22 @@ fn a_new_configuration_is_taken_while_disabled_and_forgets_the_experiment() {
 }
 
 #[test]
+fn a_new_configuration_keeps_the_positions_unless_it_counts_otherwise() {
+    let mut bench = Bench::new();
+    bench.run(0.2);
+    // Turned by hand: a turn and a quarter.
+    bench.rig.angle_rad = 2.5 * std::f64::consts::PI;
+    let mut settings = ControlSettings::default();
+    settings.speed_loop.bandwidth_hz = 20.0;
+    let before = bench.run(0.1).record.m2_count;
+    bench.apply(Command::SetConfig(&settings.build().unwrap())).unwrap();
+    assert_eq!((bench.run(0.1).record.m2_count, before), (600_000, 600_000));
+    settings.m2_encoder.reversed = true;
+    bench.apply(Command::SetConfig(&settings.build().unwrap())).unwrap();
+    assert_eq!(bench.run(0.1).record.m2_count, 0);
+}
+
+#[test]
 fn events_that_nobody_takes_are_counted() {
     let mut bench = Bench::new();
     bench.run(0.11);

@@ -211,9 +211,12 @@ impl ControlState {
         self.events.lost()
     }
 
-    /// Takes a new configuration: everything measured starts afresh, mode, tick and events go on.
-    fn adopt(&mut self, config: &ControlConfig) {
+    /// Takes a new configuration: everything measured starts afresh but the positions that are `kept`, for whoever
+    /// compares where the disc was in two experiments; mode, tick and events go on.
+    fn adopt(&mut self, config: &ControlConfig, kept: [Option<EncoderState>; 2]) {
         self.measuring = MeasuringState::new(config);
+        self.measuring.m1_encoder = kept[0].unwrap_or_default();
+        self.measuring.m2_encoder = kept[1].unwrap_or_default();
         self.sequencer.unload();
         self.tare = TareState::default();
         self.observer = config.observer.fresh();
@@ -392,9 +395,13 @@ fn carry_out(
             return refuse(if mode == Mode::Boot { Refusal::Starting } else { Refusal::NotDisabled });
         }
         Command::SetConfig(new) => {
+            let kept = [
+                config.m1_encoder.counts_like(&new.m1_encoder).then_some(state.measuring.m1_encoder),
+                config.m2_encoder.counts_like(&new.m2_encoder).then_some(state.measuring.m2_encoder),
+            ];
             *config = *new;
             events.push(tick, EventKind::ConfigChanged);
-            state.adopt(config);
+            state.adopt(config, kept);
         }
     }
     Ok(())

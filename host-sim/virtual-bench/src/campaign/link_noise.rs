@@ -52,7 +52,13 @@ pub(super) fn verdict(firmware: &Firmware, running: &Saved, scratch: &Path) -> R
         }
     };
     let unasked = |kind: &EventKind| {
-        matches!(kind, EventKind::Mode { .. } | EventKind::ConfigChanged | EventKind::Refused { .. })
+        matches!(
+            kind,
+            EventKind::Mode { .. }
+                | EventKind::ConfigChanged
+                | EventKind::Refused { .. }
+                | EventKind::FaultLatched(_)
+        )
     };
     for event in listener.events.iter().filter(|event| unasked(&event.kind)) {
         problems.push(format!("it did something nobody asked for: {event:?}"));

@@ -6,8 +6,8 @@ use host_sim::link::client::Client;
 use rig_link::message::{Answer, Command, EventKind, EventMessage, Message};
 use rig_link::telemetry::{Health, TelemetryRow};
 
-/// Time between two signs of life: a fifth of the rig's patience.
-const ALIVE_NS: u64 = 100_000_000;
+/// Time between two signs of life, that of the host tool.
+const ALIVE_NS: u64 = 50_000_000;
 /// Longest wait for an answer.
 const PATIENCE_NS: u64 = 1_000_000_000;
 /// The shortest request: its number, its kind, the checksum, and what frames them.

@@ -39,12 +39,15 @@ impl Chain {
     /// The rubber of the file that is named after the effect.
     fn new(effect: &'static str) -> Self {
         let hidden = root().join(format!("host-sim/virtual-bench/experiments/{effect}.toml"));
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chain").join(effect);
+        // What an earlier run left.
+        let _ = std::fs::remove_dir_all(&folder);
         Self {
             effect,
             hidden: ModelFile::read(&hidden, &[]).unwrap(),
             rig: root().join("host-sim/rigs/assumed.toml"),
             model: root().join("host-sim/models/assumed.toml"),
-            folder: Path::new(env!("CARGO_TARGET_TMPDIR")).join("chain").join(effect),
+            folder,
         }
     }
 
