@@ -10,7 +10,7 @@ use model_core::control::{
     ControlSettings, Experiment, Fault, M1Mode, M2Mode, Mode, Refusal, Segment, Shape,
 };
 use rig_link::inputs::{CHANNELS, Inputs};
-use rig_link::message::{Answer, Command, EventMessage, Message};
+use rig_link::message::{Answer, Command, EventKind, EventMessage, Message};
 use rig_link::program;
 use rig_link::settings::{ALL, SettingState, by_name};
 use rig_link::telemetry::{Health, TelemetryRow};
@@ -62,6 +62,8 @@ pub struct Rig<'a> {
     /// The last row.
     pub row: TelemetryRow,
     heard: Instant,
+    /// The tick of the last row before the last answer: what was asked last had come to the rig by then, by its own clock.
+    pub answered_tick: u64,
     /// The last health record.
     pub health: Health,
     /// Events since the last [`Rig::begin_rows`].
@@ -98,6 +100,7 @@ impl<'a> Rig<'a> {
             rows: Vec::new(),
             row: TelemetryRow::default(),
             heard: Instant::now(),
+            answered_tick: 0,
             health: Health::default(),
             events: Vec::new(),
         }
@@ -134,7 +137,10 @@ impl<'a> Rig<'a> {
         self.client.receive(&bytes);
         while let Some(message) = self.client.next_message() {
             match message {
-                Message::Answer { id, answer } => self.answers.push((id, answer)),
+                Message::Answer { id, answer } => {
+                    self.answered_tick = self.row.tick;
+                    self.answers.push((id, answer));
+                }
                 Message::Telemetry(row) => {
                     (self.row, self.heard) = (row, Instant::now());
                     self.rows.push(row);
@@ -398,6 +404,13 @@ impl<'a> Rig<'a> {
         Ok(Fault::from_number(self.row.fault))
     }
 
+    /// The tick at which a fault was latched, where that was told since the last [`Rig::begin_rows`].
+    #[must_use]
+    pub fn latched_tick(&self, fault: Fault) -> Option<u64> {
+        let latched = EventKind::FaultLatched(fault.number());
+        self.events.iter().find(|event| event.kind == latched).map(|event| event.tick)
+    }
+
     /// Clears what is latched, once its cause is gone.
     pub fn clear_fault(&mut self) -> Result<(), InputError> {
         self.keep_alive = None;
@@ -512,6 +525,7 @@ impl super::Commissioning<'_, '_> {
     pub(super) fn arm(&mut self, advice: &str) -> Result<(), Stop> {
         self.rig.begin_rows();
         if let Err(why) = Rig::armed_or(self.rig.arm()?) {
+            let advice = self.advice_or_silence(advice);
             self.check("arms", why, "armed, without a fault", false, advice);
         }
         self.settle()

@@ -98,11 +98,11 @@ fn stands_in_the_way(c: &mut Commissioning<'_, '_>, fault: Fault, ask: &str, bac
 /// This program falls silent with the drives on.
 fn link(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
     c.arm("see the steps before")?;
-    let from = c.rig.row.tick;
     c.rig.fall_silent();
     let timeout_s = f64::from(c.rig.settings.timing.link_timeout_s);
     let fault = c.rig.wait_for_fault(timeout_s + 1.0)?;
-    let took = super::rig::seconds(c.rig.row.tick - from);
+    let latched = c.rig.latched_tick(Fault::LinkLost).unwrap_or(c.rig.row.tick);
+    let took = super::rig::seconds(latched.saturating_sub(c.rig.answered_tick));
     let found = format!("{} after {took:.2} s", c.rig.fault().unwrap_or_else(|| "nothing".into()));
     seen(c, "the host falls silent", fault == Some(Fault::LinkLost) && took <= timeout_s + 0.1, Some(found))?;
     Ok(c.rig.clear_fault()?)

@@ -162,7 +162,8 @@ type Found = (&'static str, &'static str, &'static str);
 
 fn finds((mistake, step, word): Found) {
     let done = commission(mistake, Some(mistake));
-    let (failed_in, what) = done.failed().unwrap_or_else(|| panic!("{mistake} was not found"));
+    let (failed_in, what) =
+        done.failed().unwrap_or_else(|| panic!("{mistake} was not found; it ended: {}", done.file["ended"]));
     assert!(!done.passed && failed_in == step, "{mistake}: step {failed_in}: {what}");
     let advice = done.advice();
     assert!(advice.contains(word), "{mistake}: {what}: {advice}");
