@@ -4,6 +4,7 @@
 //! drives are switched off, not braked, because braking would already need the right sign.
 
 use model_core::control::M2Mode;
+use rig_link::telemetry::TelemetryRow;
 
 use super::line_fit::LineFit;
 use super::{Calibration, Commissioning, Stop};
@@ -15,6 +16,11 @@ const SETTLE_S: f64 = 0.03;
 const SPAN_S: f64 = 0.12;
 /// Least motion that has a direction.
 const LEAST_COUNTS: i64 = 8;
+/// Where the monitor shows the torque with the other sign.
+const OTHER_SIGN: &str = "the torque has the other sign: the cores of its reference are exchanged, or rig settings set mN.reversed";
+/// Where it shows another torque.
+const NOT_FOLLOWED: &str = "the drive does not follow its torque reference: its wire is open, or rated torque and \
+                            monitor scale are those of another drive";
 /// Codes of the converter on one side of zero.
 const DAC_HALF: f64 = 2048.0;
 
@@ -39,11 +45,9 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
         c.rig.start(m1, M2Mode::Torque, m2)?;
         c.rig.wait(SETTLE_S)?;
         let readings = c.rig.readings(SPAN_S)?;
-        let advice = "the drive does not follow its torque reference: its wire is open or its cores are exchanged, or \
-                      rated torque and monitor scale are those of another drive";
+        let advice = if is_opposed(motor, &c.rig.rows) { OTHER_SIGN } else { NOT_FOLLOWED };
         c.no_fault(&format!("{name} at {level:+.2} N m"), advice)?;
-        let count =
-            |row: &rig_link::telemetry::TelemetryRow| if motor == 0 { row.m1_count } else { row.m2_count };
+        let count = |row: &TelemetryRow| if motor == 0 { row.m1_count } else { row.m2_count };
         moved.push((*level, count(&c.rig.row) - count(&before)));
         c.rig.disarm()?;
         let asked = sign * (readings.dac[motor] - DAC_HALF) / DAC_HALF * f64::from(drive.rated_torque_nm);
@@ -61,11 +65,7 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
         format!("{:.4}", fit.slope),
         &format!("1 ± {gain}"),
         (fit.slope - 1.0).abs() <= f64::from(gain),
-        if fit.slope < 0.0 {
-            "the torque has the other sign: the cores of its reference are exchanged, or rig settings set mN.reversed"
-        } else {
-            "rated torque or monitor scale are those of another drive"
-        },
+        if fit.slope < 0.0 { OTHER_SIGN } else { "rated torque or monitor scale are those of another drive" },
     );
     let offset = s.torque_watch.offset_tolerance_nm;
     c.check(
@@ -91,6 +91,18 @@ fn one(c: &mut Commissioning<'_, '_>, motor: usize, name: &str, levels: &[f64]) 
     });
     c.settle()?;
     direction(c, name, &moved)
+}
+
+/// Whether the torque went against its reference before a fault ended it: the trim of the torque loop then drives it on.
+fn is_opposed(motor: usize, rows: &[TelemetryRow]) -> bool {
+    let of = |row: &TelemetryRow| {
+        if motor == 0 {
+            (row.m1_torque_ref_nm, row.m1_torque_nm)
+        } else {
+            (row.m2_torque_ref_nm, row.m2_torque_nm)
+        }
+    };
+    rows.iter().map(of).map(|(reference, torque)| f64::from(reference * torque)).sum::<f64>() < 0.0
 }
 
 fn direction(c: &mut Commissioning<'_, '_>, name: &str, moved: &[(f64, i64)]) -> Result<(), Stop> {

@@ -8,6 +8,7 @@ use rig_link::message::{Command, Message, Request};
 use rig_link::model::ModelRecord;
 use rig_link::program::{ProgramHeader, ProgramSegment, Upload};
 use rig_link::settings::by_key;
+use std::sync::LazyLock;
 
 /// Any bytes on the line: whatever comes out as a message is encoded to the same message again, and after one 0x00 the
 /// receiver takes the next whole frame.
@@ -69,6 +70,7 @@ fn framed(body: &[u8]) -> Vec<u8> {
 }
 
 /// The control core with what the firmware's operator puts before it.
+#[derive(Clone)]
 struct Rig {
     config: ControlConfig,
     settings: ControlSettings,
@@ -84,6 +86,15 @@ struct Rig {
     /// The last command was an accepted arm, and nothing disarmed since.
     may_be_live: bool,
 }
+
+/// A rig after its self-check, its switch seen off: most of a script's time would else go by before it can arm.
+static STARTED: LazyLock<Rig> = LazyLock::new(|| {
+    let mut rig = Rig::new();
+    for _ in 0..1_100 {
+        rig.tick();
+    }
+    rig
+});
 
 /// Ticks for which the switch must be off, and a line must permit: 5 ms.
 const PERMISSION_TICKS: u32 = 49;
@@ -214,10 +225,14 @@ impl Rig {
     }
 }
 
-/// Any sequence of requests, inputs and ticks, against the control core itself.
+/// Any sequence of requests, inputs and ticks, against the control core itself: from power-on where the first byte is 0,
+/// after its self-check where it is not.
 pub fn commands(bytes: &[u8]) {
-    let mut rig = Rig::new();
     let mut script = Script(bytes);
+    let (mut rig, most_ticks) = match script.byte() {
+        Some(0) => (Rig::new(), 4_000),
+        _ => (STARTED.clone(), 600),
+    };
     let mut ticks = 0_u32;
     while let Some(what) = script.byte() {
         match what % 8 {
@@ -287,7 +302,7 @@ pub fn commands(bytes: &[u8]) {
             }
         }
         // Bounded, whatever the script asks for.
-        if ticks > 4_000 {
+        if ticks > most_ticks {
             break;
         }
     }
@@ -313,11 +328,7 @@ pub fn upload(bytes: &[u8]) {
     }
     let Ok(experiment) = upload.complete() else { return };
     let Ok(prepared) = experiment.prepare(&config) else { return };
-    let mut rig = Rig::new();
-    rig.may_be_live = true;
-    for _ in 0..1_100 {
-        rig.tick();
-    }
+    let mut rig = STARTED.clone();
     rig.samples.arm_switch = true;
     for _ in 0..60 {
         rig.tick();

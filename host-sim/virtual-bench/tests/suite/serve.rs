@@ -98,7 +98,7 @@ fn friction_nrmse(one: &[TelemetryRow], other: &[TelemetryRow]) -> f64 {
     (off / all).sqrt()
 }
 
-/// The noise of the sensors began at another moment; what is measured is the same. Noise alone makes 0.2 to 0.8 %.
+/// The noise of the sensors began at another moment; what is measured is the same. Noise alone makes 0.2 to 0.35 %.
 const NOISE_NRMSE: f64 = 0.01;
 
 /// Runs an experiment on a served bench, and as `cargo virtual-bench` runs it.

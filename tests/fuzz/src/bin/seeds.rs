@@ -68,8 +68,9 @@ fn main() -> std::io::Result<()> {
     for (name, command) in commands {
         put("frames", name, &frame(command))?;
     }
-    // Off until the self-check is over and the switch was seen off; on; armed; a program; started; ticks with the host heard.
-    let mut script = vec![0, 255, 0, 255, 0, 255, 0, 255, 0, 255, 2, 1, 1];
+    // From power-on: off until the self-check is over and the switch was seen off; on; armed; a program; started; ticks with
+    // the host heard.
+    let mut script = vec![0, 0, 255, 0, 255, 0, 255, 0, 255, 0, 255, 2, 1, 1];
     script.extend(sent(Command::ProgramBegin(header)));
     for segment in &segments {
         script.extend(sent(Command::ProgramSegment(*segment)));
@@ -77,11 +78,14 @@ fn main() -> std::io::Result<()> {
     script.extend(sent(Command::ProgramCommit));
     script.extend([6, 0, 0, 10, 6, 1, 6, 2, 0, 30, 6, 2, 0, 200]);
     put("commands", "run", &script)?;
-    let mut armed = vec![0, 255, 0, 255, 0, 255, 0, 255, 0, 255, 2, 1, 1, 6, 0, 0, 5];
+    // After the self-check.
+    let mut armed = vec![1, 2, 1, 1, 6, 0, 0, 5];
     put("commands", "armed", &armed)?;
     armed.extend([2, 7, 0, 3, 2, 0, 1, 6, 3, 2, 1, 1, 6, 0, 0, 9]);
     put("commands", "stopped_and_cleared", &armed)?;
-    put("commands", "settings", &sent(Command::SettingSet { key: 143, value: 20.0 }))?;
+    let mut setting = vec![1];
+    setting.extend(sent(Command::SettingSet { key: 143, value: 20.0 }));
+    put("commands", "settings", &setting)?;
 
     let mut out = [0; 2048];
     let mut bytes = postcard::to_slice(&ModelRecord::default(), &mut out).expect("it fits").to_vec();
