@@ -13,6 +13,7 @@ use crate::files::rig_file::RigFile;
 use crate::identify::command::{Written, diagnose};
 use crate::identify::results::Diagnosis;
 use crate::input_error::InputError;
+use crate::report::value;
 
 /// Show what the simulation gets wrong in logs, name the cause, extend the model, measure the gain
 #[derive(clap::Args, Debug)]
@@ -92,8 +93,10 @@ fn summary(diagnosis: &Diagnosis) {
         say(&format!("\n{} ({}), probability {:.1} %", cause.id, cause.subsystem, 100.0 * cause.probability));
         for (name, p) in &cause.parameters {
             match p.std {
-                Some(std) if std > 0.0 => say(&format!("  {name:32} {:12.6}  ± {std:.2e}", p.value)),
-                _ => say(&format!("  {name:32} {:12.6}", p.value)),
+                Some(std) if std > 0.0 => {
+                    say(&format!("  {name:32} {}", value::with_uncertainty(p.value, std)));
+                }
+                _ => say(&format!("  {name:32} {}", value::plain(p.value))),
             }
         }
         cause.evidence.iter().for_each(|sentence| say(&format!("  – {sentence}")));
@@ -101,7 +104,7 @@ fn summary(diagnosis: &Diagnosis) {
     for group in &diagnosis.indistinguishable {
         say(&format!("\nthese logs do not tell apart: {}", group.join(", ")));
     }
-    let percent = |x: Option<f64>| x.map_or("–".to_string(), |x| format!("{:.3} %", 100.0 * x));
+    let percent = |x: Option<f64>| x.map_or("–".to_string(), |x| format!("{:.2} %", 100.0 * x));
     say(&format!("\n{:12} {:>10} {:>10} {:>10}", "held out", "baseline", "extended", "noise"));
     for (name, part) in &diagnosis.subsystems {
         say(&format!(

@@ -1,7 +1,7 @@
 //! `rig fit`: parameters from logs, with intervals.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -193,8 +193,10 @@ impl Part {
         for name in names {
             let Some(p) = self.parameters.get(*name) else { continue };
             match p.std {
-                Some(std) => say(&format!("{name:32} {:12.6}  ± {std:.2e}", p.value)),
-                None => say(&format!("{name:32} {:12.6}  not determined by these logs", p.value)),
+                Some(std) => say(&format!("{name:32} {}", value::with_uncertainty(p.value, std))),
+                None => {
+                    say(&format!("{name:32} {}  not determined by these logs", value::plain(p.value)));
+                }
             }
         }
     }
@@ -300,7 +302,7 @@ impl Fit {
             samples: records.iter().map(DriveRecord::len).sum(),
         };
         output.write_json("summary.json", &summary)?;
-        finish(output)
+        output.finish()
     }
 }
 
@@ -346,7 +348,11 @@ fn write_contact(
     for name in &fit.on_bound {
         say(&format!("{name} ended on a bound: it is outside of what is searched, or not needed"));
     }
-    say(&format!("friction  nrmse {nrmse:.3e}, by the observed slip {:.3e}", fit.nrmse_by_observed_slip));
+    say(&format!(
+        "left of the friction torque: {:.2} % simulated from the start, {:.2} % one step ahead by the observed slip",
+        100.0 * nrmse,
+        100.0 * fit.nrmse_by_observed_slip
+    ));
     let summary = ContactSummary {
         kind: fit.model.kind.name(),
         fit: found,
@@ -361,7 +367,7 @@ fn write_contact(
         assumed: rig.assumed.clone(),
     };
     output.write_json("summary.json", &summary)?;
-    finish(output)
+    output.finish()
 }
 
 /// The drive as TOML: symmetric friction, and friction per direction in a table of its own.
@@ -410,11 +416,4 @@ fn table((time, measured, predicted, residual): (Vec<f64>, Vec<f64>, Vec<f64>, V
     table.set_numbers("predicted", predicted);
     table.set_numbers("residual", residual);
     table
-}
-
-fn finish(output: OutputDir) -> Result<(), InputError> {
-    let folder: PathBuf = Path::to_path_buf(output.folder());
-    output.finish()?;
-    say(&format!("written to {}", folder.display()));
-    Ok(())
 }

@@ -159,9 +159,8 @@ impl Predict {
         finish(output, &table, &summary, page(&summary.nrmse, blocks))?;
         show(&summary.nrmse);
         if let Some(nrmse) = by_observed_slip {
-            say(&format!("friction  nrmse {nrmse:.3e} one step ahead, by the observed slip"));
+            say(&format!("friction  {:6.2} % one step ahead, by the observed slip", 100.0 * nrmse));
         }
-        say(&format!("written to {}", self.out.display()));
         Ok(())
     }
 
@@ -197,7 +196,6 @@ impl Predict {
                 summary.effects_not_applied.join(", ")
             ));
         }
-        say(&format!("written to {}", self.out.display()));
         Ok(())
     }
 }
@@ -242,9 +240,10 @@ fn page(nrmse: &BTreeMap<&'static str, Option<f64>>, blocks: Vec<Block>) -> Page
 }
 
 fn show(nrmse: &BTreeMap<&'static str, Option<f64>>) {
+    say("RMS of the residual over that of the measured signal:");
     for (subsystem, nrmse) in nrmse {
         match nrmse {
-            Some(nrmse) => say(&format!("{subsystem:9} nrmse {nrmse:.3e}")),
+            Some(nrmse) => say(&format!("{subsystem:9} {:6.2} %", 100.0 * nrmse)),
             None => say(&format!("{subsystem:9} nothing but zero was measured")),
         }
     }

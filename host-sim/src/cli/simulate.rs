@@ -6,7 +6,7 @@ use std::time::Instant;
 use model_core::error::ParameterError;
 use model_core::friction::series::SeriesParameters;
 
-use super::common::SetArgs;
+use super::common::{SetArgs, say};
 use super::progress::Progress;
 use crate::demo::ClosedLoop;
 use crate::files::experiment_file::{ExperimentFile, Study};
@@ -18,7 +18,7 @@ use crate::input_error::InputError;
 use crate::lockstep::Setup;
 use crate::plant::{ElementParameters, PERIOD_S, left_out};
 use crate::provenance;
-use crate::report::{Block, Chart, Page};
+use crate::report::{Block, Chart, Page, value};
 use crate::studies::candidate_models::rubber_of;
 use crate::studies::{patch_crossing, speed_sweep};
 use crate::summary::{RunFacts, Summary};
@@ -113,7 +113,25 @@ fn closed_loop(
     }
     output.write_log(&log)?;
     output.write_json("summary.json", &run.summary)?;
+    tell(&run.summary);
     output.write("report.html", run.page().to_html())
+}
+
+/// What came of it, in a few lines; `summary.json` has all of it.
+fn tell(summary: &Summary) {
+    let lines = [
+        ("friction peak", summary.friction_peak_nm, "N m"),
+        ("friction settled", summary.friction_settled_nm, "N m"),
+        ("overshoot of friction", summary.friction_overshoot.map(|share| 100.0 * share), "%"),
+        ("normal force settled", summary.normal_settled_n, "N"),
+        ("lost in a period", summary.loop_energy_j.map(|energy| 1e3 * energy), "mJ"),
+        ("damping ratio", summary.damping_ratio, ""),
+    ];
+    for (what, found, unit) in lines {
+        if let Some(found) = found {
+            say(format!("{what:22} {} {unit}", value::plain(found)).trim_end());
+        }
+    }
 }
 
 fn study(

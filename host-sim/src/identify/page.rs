@@ -6,6 +6,7 @@ use super::judge::{ContactPart, Judgement, Part};
 use super::results::Diagnosis;
 use crate::report::chart::{Chart, Line, Panel, Role, Window};
 use crate::report::page::{Block, Page, Table};
+use crate::report::value;
 
 /// Hypotheses in the table.
 const ROWS: usize = 12;
@@ -98,11 +99,11 @@ fn figures(diagnosis: &Diagnosis) -> Table {
 
 fn parameters(cause: &super::results::Cause) -> Table {
     let rows = cause.parameters.iter().map(|(name, p)| {
-        let value = match p.std {
-            Some(std) if std > 0.0 => format!("{:.4e} ± {std:.1e}", p.value),
-            _ => format!("{:.4e} (not determined by these logs, or chosen from a grid)", p.value),
+        let shown = match p.std {
+            Some(std) if std > 0.0 => value::with_uncertainty(p.value, std),
+            _ => format!("{} (not determined by these logs, or chosen from a grid)", value::plain(p.value)),
         };
-        vec![name.clone(), value]
+        vec![name.clone(), shown]
     });
     Table {
         head: ["parameter", "value ± standard deviation"].map(String::from).to_vec(),

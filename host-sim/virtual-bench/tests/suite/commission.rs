@@ -201,7 +201,7 @@ fn nine_more_are_found_too() {
         ("encoders-exchanged", "encoders", "plugs of the two encoders"),
         ("m1-encoder-swapped", "encoders", "A and B are exchanged"),
         ("m1-reference-reversed", "torque", "other sign"),
-        ("m2-reference-reversed", "torque", "torque reference"),
+        ("m2-reference-reversed", "torque", "other sign"),
     ] {
         finds(found);
     }
