@@ -4,8 +4,8 @@
 //! of (eʳ − 1 − r)/r²; its error is 1e-8 of eʳ, a tenth of what f32 can hold.
 //!
 //! Both stand in every friction step, and this form is inlined and free of branches: a LuGre step
-//! takes half the time that it takes with `libm::expf` and `libm::expm1f` (`cargo bench -p
-//! model-core`). Only additions, multiplications and integer operations occur, so the chip and the
+//! takes half the time that it takes with `libm::expf` and `libm::expm1f` (`cargo bench
+//! --bench model_steps`). Only additions, multiplications and integer operations occur, so the chip and the
 //! PC compute the same bits. Below −87 the result is that of −87 (1.6e-38), above 88 that of 88.
 
 const INVERSE_LN_2: f32 = core::f32::consts::LOG2_E;

@@ -6,7 +6,7 @@
 //! force for σ1 = a2 = 0.
 //!
 //! Left out: the patch. There the literal reading is LuGre's patch in steady rolling, and the material one does along its way
-//! what the element does in time (`model-core/tests/claims.rs`).
+//! what the element does in time (`model-core/tests/suite/claims.rs`).
 
 use std::f64::consts::TAU;
 

@@ -11,8 +11,10 @@ use model_core::control::{ControlSettings, RawCaps};
 use rig_link::model::ModelRecord;
 use rig_link::settings::{ALL, by_key};
 use rig_store::{Board, Place, Settings};
+use std::num::NonZeroUsize;
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
+use std::thread::available_parallelism;
 
 const WORD: usize = 32;
 const SECTOR: usize = 128 * 1024;
@@ -211,28 +213,36 @@ fn cut_everywhere(flash: &Flash, step: &Step, count: &mut [u32; 2]) {
     let whole = undisturbed.into_flash();
     assert!(whole.done > 0, "{step:?} changes nothing");
     count[1] += whole.erased;
-    for at in 0..whole.done {
-        for left in WAYS {
-            count[0] += 1;
-            let what = || format!("{step:?} cut at {at} of {}, left {left:?}", whole.done);
-            let mut settings = open(Flash { cut: Some((at, left)), ..before.clone() }).unwrap();
-            let _ = step.take(&mut settings);
-            let mut flash = settings.into_flash();
-            assert!(flash.done > at, "{}: the cut did not come", what());
-            (flash.cut, flash.done) = (None, 0);
-            let mut settings = open(flash).unwrap_or_else(|damage| panic!("{}: {damage}", what()));
-            let after = said(&settings);
-            assert!(is_old_or_new(&after, &old, &new), "{}: {after:?}", what());
-            // Another value goes in, and is there after the next start, with all the others.
-            let next = Step::Set(143, 27.25);
-            next.take(&mut settings).unwrap_or_else(|error| panic!("{}: then {error}", what()));
-            let expected = said(&settings);
-            let flash = settings.into_flash();
-            let again =
-                open(flash).unwrap_or_else(|damage| panic!("{}, and a value stored: {damage}", what()));
-            assert_eq!(said(&again), expected, "{}", what());
+    let cuts: Vec<(u32, Left)> = (0..whole.done).flat_map(|at| WAYS.map(|left| (at, left))).collect();
+    count[0] += cuts.len() as u32;
+    // No cut knows of another: they share the cores.
+    let share = cuts.len().div_ceil(available_parallelism().map_or(1, NonZeroUsize::get));
+    let share_of = |cuts: &[(u32, Left)]| cuts.iter().for_each(|one| cut(&before, step, *one, [&old, &new]));
+    std::thread::scope(|threads| {
+        for cuts in cuts.chunks(share) {
+            threads.spawn(move || share_of(cuts));
         }
-    }
+    });
+}
+
+/// Cuts the supply once, and looks at what the next start finds; it was `old` before the step and is `new` after it.
+fn cut(before: &Flash, step: &Step, (at, left): (u32, Left), [old, new]: [&Said; 2]) {
+    let what = || format!("{step:?} cut at {at}, left {left:?}");
+    let mut settings = open(Flash { cut: Some((at, left)), ..before.clone() }).unwrap();
+    let _ = step.take(&mut settings);
+    let mut flash = settings.into_flash();
+    assert!(flash.done > at, "{}: the cut did not come", what());
+    (flash.cut, flash.done) = (None, 0);
+    let mut settings = open(flash).unwrap_or_else(|damage| panic!("{}: {damage}", what()));
+    let after = said(&settings);
+    assert!(is_old_or_new(&after, old, new), "{}: {after:?}", what());
+    // Another value goes in, and is there after the next start, with all the others.
+    let next = Step::Set(143, 27.25);
+    next.take(&mut settings).unwrap_or_else(|error| panic!("{}: then {error}", what()));
+    let expected = said(&settings);
+    let flash = settings.into_flash();
+    let again = open(flash).unwrap_or_else(|damage| panic!("{}, and a value stored: {damage}", what()));
+    assert_eq!(said(&again), expected, "{}", what());
 }
 
 /// The store as steps leave it.
@@ -276,24 +286,38 @@ fn every_key_reads_old_or_new_after_a_cut_at_any_word() {
         cut_everywhere(&flash, &step, &mut count);
         flash = after(flash, [step]);
     }
-    // Twice round: as a sector fills up its records go to the other, and it is erased.
-    flash = after(flash, [Step::Model(true), Step::Set(321, 4.0)]);
-    for round in 0..2 {
-        let mut value = 20.0;
-        // Up to the last few words at once, then store by store.
-        let mut settings = open(flash).unwrap();
-        while free_words(settings.flash()) > 14 {
-            Step::Model(true).take(&mut settings).unwrap();
-        }
-        flash = settings.into_flash();
-        let erased = count[1];
-        while count[1] == erased {
-            value += 0.125;
-            cut_everywhere(&flash, &Step::Set(143, value), &mut count);
-            flash = after(flash, [Step::Set(143, value)]);
-            assert!(value < 30.0, "round {round}: the sector does not fill up");
-        }
-    }
     println!("{} cuts, {} of sectors' erasures undisturbed", count[0], count[1]);
-    assert!(count[0] > 200 && count[1] >= 3, "{count:?}");
+    assert!(count[0] > 100 && count[1] >= 1, "{count:?}");
+}
+
+/// Those that take long: `cargo verify` runs them, and `cargo test long:: -- --ignored`.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn every_key_reads_old_or_new_after_a_cut_at_any_word_when_a_full_sector_is_given_up() {
+        let mut count = [0; 2];
+        // Twice round: as a sector fills up its records go to the other, and it is erased.
+        let steps = [Step::Set(143, 26.0), Step::Model(true), Step::Set(321, 4.0)];
+        let mut flash = after(Flash::blank(), steps);
+        for round in 0..2 {
+            let mut value = 20.0;
+            // Up to the last few words at once, then store by store.
+            let mut settings = open(flash).unwrap();
+            while free_words(settings.flash()) > 14 {
+                Step::Model(true).take(&mut settings).unwrap();
+            }
+            flash = settings.into_flash();
+            let erased = count[1];
+            while count[1] == erased {
+                value += 0.125;
+                cut_everywhere(&flash, &Step::Set(143, value), &mut count);
+                flash = after(flash, [Step::Set(143, value)]);
+                assert!(value < 30.0, "round {round}: the sector does not fill up");
+            }
+        }
+        println!("{} cuts, {} of sectors' erasures undisturbed", count[0], count[1]);
+        assert!(count[0] > 100 && count[1] >= 2, "{count:?}");
+    }
 }

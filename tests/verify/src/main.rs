@@ -68,6 +68,8 @@ fn host(run: &mut Runner) {
     run.cargo("lints", ".", &["clippy", "--quiet", "--all-targets", "--", "-D", "warnings"]);
     run.cargo_env("docs", ".", &["doc", "--quiet", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")]);
     run.cargo("host suite", ".", &["test", "--no-fail-fast"]);
+    // What takes too long for every change: tests in modules of that name.
+    run.cargo("host suite, long", ".", &["test", "--no-fail-fast", "long::", "--", "--ignored"]);
 }
 
 fn policy(run: &mut Runner) {

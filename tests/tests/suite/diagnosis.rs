@@ -1,0 +1,97 @@
+//! The diagnosis on logs of the independent generator: one case for each kind of answer. How often it is right over all
+//! effects, laws and rigs is counted by `cargo rig trials`; these are the cases that must not be lost on the way.
+
+use host_sim::files::log::Log;
+use host_sim::files::model_file::ModelFile;
+use host_sim::files::rig_file::RigFile;
+use host_sim::identify::command::{Written, diagnose};
+use rig_tests::{Base, Effect, Scenario, generate};
+
+fn answer(effects: &[Effect], seed: u64, base: Base) -> Written {
+    let case = generate(&Scenario { base, ..Scenario::new(effects, seed) }).unwrap();
+    let log = |name: &str, text: &String| Log::parse_csv(name, text.as_bytes()).unwrap();
+    let train: Vec<Log> =
+        case.train.iter().enumerate().map(|(i, text)| log(&format!("train{i}"), text)).collect();
+    let holdout = log("holdout", &case.holdout);
+    let rig = RigFile::parse("rig", &case.rig_toml).unwrap();
+    let model = ModelFile::parse("model", &case.model_toml).unwrap();
+    diagnose(&train, &[holdout], &rig, &model, &|| 0.0, &|_| ()).unwrap()
+}
+
+fn named(effects: &[Effect], seed: u64, base: Base) -> Written {
+    let written = answer(effects, seed, base);
+    let causes: Vec<&str> = written.diagnosis.causes.iter().map(|c| c.id.as_str()).collect();
+    let hidden: Vec<&str> = effects.iter().map(|e| e.id()).collect();
+    println!("{hidden:?} -> {} {causes:?}; {}", written.diagnosis.verdict, written.diagnosis.sentence);
+    assert_eq!((written.diagnosis.verdict, causes), ("named", hidden));
+    let sum: f64 = written.diagnosis.posterior.values().sum();
+    assert!((sum - 1.0).abs() < 1e-9, "the posterior sums to {sum}");
+    written
+}
+
+#[test]
+fn a_missing_block_is_named_where_the_baseline_is_bristles() {
+    let written = named(&[Effect::ElementCompliance], 215, Base::Series);
+    assert!(written.model.starts_with("kind = \"series\""), "{}", written.model);
+}
+
+#[test]
+fn a_clean_log_is_answered_with_nothing() {
+    let written = answer(&[], 103, Base::Series);
+    assert_eq!(written.diagnosis.verdict, "none", "{}", written.diagnosis.sentence);
+    assert!(written.diagnosis.posterior["none"] > 0.5);
+}
+
+#[test]
+fn a_training_log_is_no_held_out_log() {
+    let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&[], 5) }).unwrap();
+    let log = Log::parse_csv("same.csv", case.train[0].as_bytes()).unwrap();
+    let rig = RigFile::parse("rig", &case.rig_toml).unwrap();
+    let model = ModelFile::parse("model", &case.model_toml).unwrap();
+    let refused =
+        diagnose(std::slice::from_ref(&log), std::slice::from_ref(&log), &rig, &model, &|| 0.0, &|_| ())
+            .map(|_| ())
+            .unwrap_err()
+            .to_string();
+    assert!(refused.contains("is the same log as same.csv of --train"), "{refused}");
+}
+
+/// Those that take long: `cargo verify` runs them, and `cargo test long:: -- --ignored`.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn friction_that_fades_with_heat_is_named_and_its_law_read_back() {
+        let written = named(&[Effect::ThermalFade], 101, Base::Lugre);
+        let model = ModelFile::parse("model-extended.toml", &written.model).unwrap();
+        assert_eq!(model.extensions[0].id, "thermal_fade");
+        let part = &written.diagnosis.subsystems["friction"];
+        assert!(part.extended.gain.unwrap() > 0.3, "{:?}", part.extended);
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn a_drifting_bridge_is_told_from_wear_by_the_drive() {
+        named(&[Effect::BridgeDrift], 211, Base::Series);
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn breakaway_that_grows_with_rest_is_named_through_stick_slip() {
+        named(&[Effect::StaticAgeing], 205, Base::Series);
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn cogging_is_named_with_its_orders() {
+        let written = named(&[Effect::M2Ripple], 101, Base::Lugre);
+        assert!(written.diagnosis.causes[0].parameters.keys().any(|name| name.starts_with("order")));
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn springs_that_harden_are_named() {
+        named(&[Effect::FoilHardening], 101, Base::Lugre);
+    }
+}
