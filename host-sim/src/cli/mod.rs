@@ -31,7 +31,7 @@ pub mod progress;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::session::Shared;
 use crate::input_error::{InputError, Kind};
@@ -100,9 +100,26 @@ commands! {
     Completions(convert::Completions),
 }
 
-/// The command line, for what describes it: completions, tests.
+/// The command line. What reads no log does not show the options for logs of other tools.
 fn command_line() -> clap::Command {
-    <Cli as clap::CommandFactory>::command()
+    let mut command = Cli::command();
+    // Gives the subcommands the options of every command.
+    command.build();
+    command.mut_subcommands(without_logs)
+}
+
+/// Whether a subcommand reads logs: one of its arguments is a log.
+fn reads_logs(command: &clap::Command) -> bool {
+    let values = command.get_arguments().filter_map(clap::Arg::get_value_names).flatten();
+    values.into_iter().any(|name| name.starts_with("LOG"))
+}
+
+fn without_logs(command: clap::Command) -> clap::Command {
+    if reads_logs(&command) {
+        return command;
+    }
+    let of_logs = |arg: &clap::Arg| arg.get_help_heading() == Some(session::LOGS_OF_OTHER_TOOLS);
+    command.mut_args(|arg| if of_logs(&arg) { arg.hide(true) } else { arg }).mut_subcommands(without_logs)
 }
 
 /// Runs the tool with the arguments of the process.
@@ -113,13 +130,16 @@ pub fn main() -> ExitCode {
 /// Runs the tool with these arguments, its name first.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let cli = match Cli::try_parse_from(&arguments) {
+    let line = command_line();
+    let parsed = line.clone().try_get_matches_from(&arguments);
+    let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => return refuse_arguments(&error),
     };
     same_logs::warn_of(&arguments);
     let name = cli.command.name();
-    let result = cli.shared.begin().and_then(|()| cli.command.run());
+    let reads_logs = line.find_subcommand(&name).is_some_and(reads_logs);
+    let result = cli.shared.begin(reads_logs).and_then(|()| cli.command.run());
     cli.shared.end(&name, &result);
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -150,9 +170,27 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent_and_every_subcommand_shows_an_example() {
         command_line().debug_assert();
-        for command in command_line().get_subcommands() {
+        for command in command_line().get_subcommands().filter(|command| command.get_name() != "help") {
             let help = command.clone().render_long_help().to_string();
             assert!(help.contains("Example"), "{}", command.get_name());
         }
+    }
+
+    #[test]
+    fn options_for_logs_are_shown_and_taken_where_logs_are_read_and_nowhere_else() {
+        let shown = |name: &str| {
+            let line = command_line();
+            let command = line.find_subcommand(name).unwrap();
+            (reads_logs(command), command.clone().render_long_help().to_string().contains("--map"))
+        };
+        for name in ["fit", "predict", "diagnose", "convert"] {
+            assert_eq!(shown(name), (true, true), "{name}");
+        }
+        for name in ["simulate", "run", "monitor", "settings", "demo", "completions"] {
+            assert_eq!(shown(name), (false, false), "{name}");
+        }
+        let arguments = ["rig", "simulate", "--experiment", "fig20", "--out", "x", "--unit", "theta=deg"];
+        let refused = Cli::try_parse_from(arguments).unwrap().shared.begin(false).unwrap_err().to_string();
+        assert!(refused.contains("--unit") && refused.contains("reads no log"), "{refused}");
     }
 }

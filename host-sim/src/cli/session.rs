@@ -15,6 +15,9 @@ use crate::files::output_dir;
 use crate::input_error::{InputError, Kind};
 use crate::notices;
 
+/// Heading of the options for commands that read logs.
+pub(super) const LOGS_OF_OTHER_TOOLS: &str = "Logs of other tools";
+
 /// Options that every command takes.
 #[derive(clap::Args, Debug, Clone, Default)]
 pub(super) struct Shared {
@@ -25,10 +28,10 @@ pub(super) struct Shared {
     #[arg(long, global = true, help_heading = "Options of every command")]
     json: bool,
     /// This column of the logs is that signal, e.g. m2_angle_rad=theta; may be given several times
-    #[arg(long, global = true, value_name = "SIGNAL=COLUMN", num_args = 1.., help_heading = "Logs of other tools")]
+    #[arg(long, global = true, value_name = "SIGNAL=COLUMN", num_args = 1.., help_heading = LOGS_OF_OTHER_TOOLS)]
     map: Vec<String>,
     /// This column has that unit, e.g. theta=deg, Fz=-kN, pos=counts/4096; may be given several times
-    #[arg(long, global = true, value_name = "COLUMN=UNIT", num_args = 1.., help_heading = "Logs of other tools")]
+    #[arg(long, global = true, value_name = "COLUMN=UNIT", num_args = 1.., help_heading = LOGS_OF_OTHER_TOOLS)]
     unit: Vec<String>,
 }
 
@@ -54,8 +57,14 @@ pub(super) fn say(line: &str) {
 }
 
 impl Shared {
-    /// Puts the options in force.
-    pub(super) fn begin(&self) -> Result<(), InputError> {
+    /// Puts the options in force, for a command that reads logs or one that does not.
+    pub(super) fn begin(&self, reads_logs: bool) -> Result<(), InputError> {
+        let options = [("--map", &self.map), ("--unit", &self.unit)];
+        if !reads_logs && let Some((name, _)) = options.iter().find(|(_, values)| !values.is_empty()) {
+            let what =
+                format!("{name} says how a log of another tool is read, and this command reads no log");
+            return Err(InputError::new(what));
+        }
         if !(self.map.is_empty() && self.unit.is_empty()) {
             read_logs_with(Columns::from_options(&self.map, &self.unit)?);
         }
