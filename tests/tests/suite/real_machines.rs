@@ -8,12 +8,13 @@
 //! | an O-ring in a cylinder | E. Zillen, 3D-printed pneumatic actuator (CC0-1.0) | half loop 3.98, 5.51, 7.97 N at 1, 3, 7 bar: affine in the load |
 //!
 //! The records are not part of the project. They are looked for in `../shared/data` beside it, or where `RIG_DATA`
-//! says; a test whose record is not there says so and passes. The tool is `RIG_BIN`, or is built here.
+//! says; a test whose record is not there says so and passes.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::ExitCode;
 
 use serde_json::Value;
 
@@ -109,34 +110,19 @@ impl Bench {
     /// Has the logs diagnosed.
     fn diagnose(&self, files: Option<[PathBuf; 2]>) -> Diagnosis {
         let out = self.folder.path().join("out");
-        let mut command = Command::new(rig());
-        command.arg("diagnose").arg("--train").args(&self.train).arg("--holdout").args(&self.holdout);
-        command.arg("--out").arg(&out);
+        let mut arguments: Vec<OsString> = ["rig", "diagnose", "--train"].map(Into::into).into();
+        arguments.extend(self.train.iter().map(Into::into));
+        arguments.push("--holdout".into());
+        arguments.extend(self.holdout.iter().map(Into::into));
+        arguments.extend(["--out".into(), out.clone().into()]);
         if let Some([rig, model]) = files {
-            command.arg("--rig").arg(rig).arg("--model").arg(model);
+            arguments.extend(["--rig".into(), rig.into(), "--model".into(), model.into()]);
         }
-        let run = command.output().unwrap();
-        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        // In this process: the tool's program would have to be built for it.
+        assert_eq!(host_sim::cli::run(arguments), ExitCode::SUCCESS, "its reason is on stderr");
         let text = std::fs::read_to_string(out.join("diagnosis.json")).unwrap();
         Diagnosis(serde_json::from_str(&text).unwrap())
     }
-}
-
-/// The tool: `RIG_BIN`, or built in the profile of this test.
-fn rig() -> PathBuf {
-    if let Some(path) = std::env::var_os("RIG_BIN") {
-        return path.into();
-    }
-    let here = std::env::current_exe().unwrap();
-    let profile = here.parent().unwrap().parent().unwrap();
-    let mut build = Command::new(env!("CARGO"));
-    build.args(["build", "--quiet", "--package", "host-sim", "--bin", "rig", "--manifest-path"]);
-    build.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml"));
-    if profile.ends_with("release") {
-        build.arg("--release");
-    }
-    assert!(build.status().unwrap().success());
-    profile.join(format!("rig{}", std::env::consts::EXE_SUFFIX))
 }
 
 struct Diagnosis(Value);
