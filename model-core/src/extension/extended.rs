@@ -126,8 +126,7 @@ impl<T: Real> ExtendedFriction<T> {
         }
         let mut contact = self.contact(input, state.time_s, T::ONE);
         // What the load can carry includes what the effects make of friction.
-        contact.normal_force_n =
-            contact.normal_force_n * self.road_factor(state, &contact, input.disc_angle_rad);
+        contact.road_factor = self.road_factor(state, &contact, input.disc_angle_rad);
         state.force_n = torque_nm / self.radius_m;
         state.friction = self.friction.holding(state.force_n, &contact);
     }

@@ -67,7 +67,8 @@ impl<T: Real> Element<T> for BrushCurve<T> {
             let held_m = contact.load_n() * self.stribeck.largest() * self.brush.compliance;
             state.deformation_m = held_m.copysign(state.deformation_m);
         }
-        let mu_c = self.stribeck.coefficient(v) + self.a2 * v.abs();
+        // The brush multiplies all of µ_c with F_N θ, of which the viscous part has no θ (eqs. 13–14).
+        let mu_c = self.stribeck.coefficient(v) + self.a2 * v.abs() / contact.road_factor;
         let mut brush = self.brush;
         brush.mu_c = mu_c;
         brush.step(state, contact)

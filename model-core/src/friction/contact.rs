@@ -10,7 +10,8 @@ pub struct Contact<T> {
     /// Normal force at the end of the step, N. Zero or less means: no contact, no friction.
     pub normal_force_n: T,
     /// Scales the road factor θ of the parameters; 1 leaves it. Effects that change the friction
-    /// coefficient in time (temperature, wear, disc angle) act through it.
+    /// coefficient in time (temperature, wear, disc angle) act through it. As eqs. 13–14 have it, it
+    /// multiplies g alone and leaves the viscous term F_N a2 v.
     pub road_factor: T,
 }
 
@@ -21,10 +22,16 @@ impl<T: Real> Contact<T> {
         Self { sliding_speed_m_s, normal_force_n, road_factor: T::ONE }
     }
 
-    /// The load that friction is proportional to: normal force × road factor, not below zero.
+    /// The load that g is multiplied with: normal force × road factor, not below zero.
     #[inline]
     pub(crate) fn load_n(&self) -> T {
         (self.normal_force_n * self.road_factor).at_least(T::ZERO)
+    }
+
+    /// The viscous term F_N a2 v of eq. 14, which the road factor leaves alone.
+    #[inline]
+    pub(crate) fn viscous_n(&self, a2_s_per_m: T, speed_m_s: T) -> T {
+        self.normal_force_n * a2_s_per_m * speed_m_s
     }
 }
 

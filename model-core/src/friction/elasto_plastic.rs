@@ -96,7 +96,10 @@ impl<T: Real> Element<T> for ElastoPlastic<T> {
         }
         state.deflection_m = next;
         let rate = v - v.abs() * self.plasticity(next, steady) * next / steady.abs();
-        FrictionForce { force_n: b.sigma0 * next + b.sigma1 * rate + load_n * b.a2 * v, tip_speed_m_s: v }
+        FrictionForce {
+            force_n: b.sigma0 * next + b.sigma1 * rate + contact.viscous_n(b.a2, v),
+            tip_speed_m_s: v,
+        }
     }
 
     fn deformation_m(state: &LugreState<T>) -> T {

@@ -85,7 +85,7 @@ impl<T: Real> Element<T> for FrictionalLag<T> {
         state.deflection_m = z - gone * z + gone * limit_m.copysign(v);
         let deflection_rate = v - rate * state.deflection_m;
         FrictionForce {
-            force_n: b.sigma0 * state.deflection_m + b.sigma1 * deflection_rate + load_n * b.a2 * v,
+            force_n: b.sigma0 * state.deflection_m + b.sigma1 * deflection_rate + contact.viscous_n(b.a2, v),
             tip_speed_m_s: v,
         }
     }

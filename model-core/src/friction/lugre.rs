@@ -161,7 +161,7 @@ impl<T: Real> Lugre<T> {
         state.deflection_m = next;
         let deflection_rate = v - rate * next;
         FrictionForce {
-            force_n: self.sigma0 * next + self.sigma1 * deflection_rate + load * self.a2 * v,
+            force_n: self.sigma0 * next + self.sigma1 * deflection_rate + contact.viscous_n(self.a2, v),
             tip_speed_m_s: v,
         }
     }

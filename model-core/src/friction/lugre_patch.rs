@@ -142,7 +142,7 @@ impl<T: Real, const N: usize> LugrePatch<T, N> {
             }
         }
         let sum = state.deflection_m.iter().fold(T::ZERO, |sum, u| sum + *u);
-        load * (self.sigma0 * sum * self.share + self.a2 * v)
+        load * (self.sigma0 * sum * self.share) + contact.viscous_n(self.a2, v)
     }
 
     /// Bristle stiffness per unit load σ0, 1/m.

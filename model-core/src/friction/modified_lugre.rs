@@ -5,8 +5,8 @@
 //! g is evaluated at s, which holds the rate that is sought, so a step is an implicit equation. Eq. 18 as typeset
 //! is ambiguous; it is read as exp(−(|v_r − ∂u/∂t|/v0)^δ), consistent with eq. 13. Eqs. 15 and 19 drop
 //! F_N; here σ0 is in N/m and F_N is kept, so that the parameters are those of the LuGre model. As in the
-//! rest of the project the road factor θ of eq. 13 multiplies g alone; a factor that changes in time
-//! ([`Contact::road_factor`]) scales the load, and with it the viscous term F_N a2 v, which eqs. 13–14 do not have.
+//! rest of the project the road factor θ of eq. 13 multiplies g alone, and so does a factor that changes in time
+//! ([`Contact::road_factor`]); the viscous term F_N a2 v has neither.
 //!
 //! **Which rate.** A single element has one rate. In a patch there are two, and two models by name:
 //! [`Scheme::Literal`] takes the rate at a place, ∂u/∂t, as printed; in steady rolling it is zero, s = v_r, and the patch
@@ -167,7 +167,9 @@ impl<T: Real> ModifiedLugre<T> {
         let rate = (next - u) * self.inverse_step;
         *state = ModifiedLugreState { deflection_m: next, rate_m_s: rate, tip_speed_m_s };
         FrictionForce {
-            force_n: self.bristles.sigma0 * next + self.bristles.sigma1 * rate + load * self.bristles.a2 * v,
+            force_n: self.bristles.sigma0 * next
+                + self.bristles.sigma1 * rate
+                + contact.viscous_n(self.bristles.a2, v),
             tip_speed_m_s: v - rate,
         }
     }

@@ -66,7 +66,7 @@ impl<T: Real> Element<T> for PrakashClifton<T> {
     }
 
     fn holding(&self, force_n: T, contact: &Contact<T>) -> PrakashCliftonState<T> {
-        let load_n = contact.load_n();
+        let load_n = contact.normal_force_n.at_least(T::ZERO);
         let LugreState { deflection_m } = Element::holding(&self.bristles, force_n, contact);
         PrakashCliftonState { deflection_m, felt_n: load_n, load_n }
     }
@@ -77,8 +77,8 @@ impl<T: Real> Element<T> for PrakashClifton<T> {
 
     fn step(&self, state: &mut PrakashCliftonState<T>, contact: &Contact<T>) -> FrictionForce<T> {
         let v = contact.sliding_speed_m_s;
-        let load_n = contact.load_n();
-        if load_n <= T::ZERO {
+        let load_n = contact.normal_force_n;
+        if contact.load_n() <= T::ZERO {
             *state = PrakashCliftonState::default();
             return FrictionForce { force_n: T::ZERO, tip_speed_m_s: v };
         }
@@ -90,7 +90,8 @@ impl<T: Real> Element<T> for PrakashClifton<T> {
         // As a sum of changes, so that slow creep is not lost beside the load in f32.
         let felt_n =
             before_n + followed * (last_n - before_n) + (load_n - last_n) * (T::ONE - followed / reach);
-        let limit_m = T::HALF * (before_n + felt_n) * b.stribeck.coefficient(v) * b.inverse_sigma0;
+        let mean_n = T::HALF * (before_n + felt_n) * contact.road_factor;
+        let limit_m = mean_n * b.stribeck.coefficient(v) * b.inverse_sigma0;
         let rate = v.abs() / limit_m;
         let gone = -(-(b.step_s * rate)).exp_m1();
         let z = state.deflection_m;

@@ -81,7 +81,8 @@ impl<T: Real, const N: usize> LugrePatch<T, N> {
     pub fn force_under_n(&self, state: &PatchState<T, N>, contact: &Contact<T>, weights: &[T; N]) -> T {
         let borne = state.deflection_m.iter().zip(weights).fold(T::ZERO, |sum, (u, w)| sum + *u * *w);
         let load_n = contact.load_n();
-        load_n * (self.stiffness_per_m() * borne + self.viscous_s_per_m() * contact.sliding_speed_m_s)
+        load_n * (self.stiffness_per_m() * borne)
+            + contact.viscous_n(self.viscous_s_per_m(), contact.sliding_speed_m_s)
     }
 }
 

@@ -123,7 +123,10 @@ struct Balance<T> {
 
 /// The load side of one step, constant while v is searched.
 struct Load<T> {
+    /// What g is multiplied with.
     load_n: T,
+    /// F_N a2, N s/m; the road factor has no part in it.
+    viscous: T,
     /// Steady deflection per unit of g: F_N/σ0.
     reach_m: T,
     /// Δt σ0/F_N
@@ -234,12 +237,11 @@ impl<T: Real, const N: usize> Series<T, N> {
         let deflection_m = (load.carried_m + self.lugre.step_s * v) * inverse;
         let lambda_slope = (rate_per_speed * (T::ONE - v_slope * inverse_g)).copysign(v);
         let slope = (self.lugre.step_s - deflection_m * lambda_slope) * inverse;
-        let viscous = load.load_n * self.lugre.a2;
         let bristle_force_n =
-            self.lugre.sigma0 * deflection_m + self.sigma1_per_step * (deflection_m - z) + viscous * v;
+            self.lugre.sigma0 * deflection_m + self.sigma1_per_step * (deflection_m - z) + load.viscous * v;
         Balance {
             value: bristle_force_n + load.impedance * v - load.drive_n,
-            slope: (self.lugre.sigma0 + self.sigma1_per_step) * slope + viscous + load.impedance,
+            slope: (self.lugre.sigma0 + self.sigma1_per_step) * slope + load.viscous + load.impedance,
             deflection_m,
             bristle_force_n,
         }
@@ -278,6 +280,7 @@ impl<T: Real, const N: usize> Series<T, N> {
             let carried_m = carried_m.within(lead * most);
             let load = Load {
                 load_n,
+                viscous: contact.viscous_n(self.lugre.a2, T::ONE),
                 reach_m,
                 stiffness_rate: step_s * self.lugre.sigma0 / load_n,
                 drive_n,

@@ -9,7 +9,7 @@ use model_core::friction::modified_lugre::{ModifiedLugre, ModifiedLugreState};
 use model_core::friction::series::{Series, SeriesParameters, SeriesState};
 use model_core::friction::static_curve::{Bell, BellParameters};
 use model_core::friction::stribeck::{Stribeck, StribeckParameters};
-use model_core::friction::{Contact, FrictionModel};
+use model_core::friction::{Contact, FrictionModel, FrictionParameters, ModelKind};
 use model_core::real::Real;
 
 fn as_f32(p: &LugreParameters<f64>) -> LugreParameters<f32> {
@@ -276,6 +276,53 @@ fn the_road_factor_scales_friction_and_nothing_else() {
     };
     assert!((run(0.7, 100.0) / run(1.0, 100.0) - 0.7).abs() < 1e-9);
     assert_eq!(run(0.5, 100.0), run(1.0, 50.0));
+}
+
+#[test]
+fn the_road_factor_is_in_g_alone_as_eqs_13_and_14_have_it() {
+    let (v, load) = (0.3, 90.0);
+    for &kind in ModelKind::ALL
+        .iter()
+        .filter(|kind| FrictionParameters::<f64>::typical(**kind).get("a2_s_per_m").is_some())
+    {
+        let steady = |road_factor: f64, a2: f64| {
+            // Slid for 1.5 m, past every memory; damped so that no block sticks and slips.
+            let damped = FrictionParameters::<f64>::typical(kind).with("c_u_n_s_per_m", 160.0);
+            let model = damped.with("a2_s_per_m", a2).model(1e-4).unwrap();
+            let contact = Contact { sliding_speed_m_s: v, normal_force_n: load, road_factor };
+            let mut state = model.rest();
+            (0..50_000).map(|_| model.step(&mut state, &contact).force_n).last().unwrap()
+        };
+        for road_factor in [0.6, 1.0, 1.4] {
+            let (with, without) = (steady(road_factor, 0.4), steady(road_factor, 0.0));
+            let expected = load * 0.4 * v;
+            // The slowest branch of filled rubber still relaxes: 1.3e-5. All others are within 1e-6.
+            assert!(
+                (with - without - expected).abs() < 1e-4 * expected,
+                "{} at {road_factor}: {with} {without}",
+                kind.name()
+            );
+            assert!(
+                (without / steady(1.0, 0.0) - road_factor).abs() < 1e-4,
+                "{} at {road_factor}: {without}",
+                kind.name()
+            );
+        }
+    }
+    let p = PatchParameters {
+        sigma0_per_m: 2e5,
+        a2_s_per_m: 0.4,
+        stribeck: StribeckParameters { a0: 0.5, a1: 0.7, v0_m_s: 0.5, delta: 0.5, theta: 1.0 },
+        length_m: 0.1,
+        largest_transport_speed_m_s: 1.0,
+    };
+    let patch = LugrePatch::<f64, 8>::new(&p, 1e-4).unwrap();
+    let mut state = PatchState::default();
+    let contact = Contact { sliding_speed_m_s: v, normal_force_n: load, road_factor: 0.6 };
+    let force = (0..20_000).map(|_| patch.step(&mut state, &contact, 0.0)).last().unwrap();
+    let expected = load * (0.6 * (0.5 + 0.7 * (-(v / 0.5f64).sqrt()).exp()) + 0.4 * v);
+    assert!((force / expected - 1.0).abs() < 1e-9, "patch: {force} {expected}");
+    assert!((patch.force_under_n(&state, &contact, &[0.125; 8]) / expected - 1.0).abs() < 1e-9);
 }
 
 #[test]

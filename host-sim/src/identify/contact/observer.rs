@@ -5,7 +5,7 @@
 //! u̇ = (F − k u − Σ k_b e_b)/c,  ė_b = u̇ − e_b/τ_b,  w = V − u̇
 //!
 //! solved exactly for a force that goes in straight lines between samples. Where the tip slips the law is evaluated at
-//! the observed slip, F = sgn(w) (F_N g(|w|) e^m + viscous); where it sticks F = k u + c V + branches, u integrated from
+//! the observed slip, F = sgn(w) (F_N g(|w|) e^m + F_N a2 |w| + film); where it sticks F = k u + c V + branches, u integrated from
 //! the motion with a weak pull to the measurement, held below breakaway. The two are blended smoothly, since a switch
 //! makes the likelihood rough: s is a product of sigmoids in the slip speed, in its ratio to the root's speed and in the
 //! force's size and sign.
@@ -197,8 +197,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         out.sliding[i] = slips;
 
         let sliding = if slips > 1e-9 {
-            sign * (loaded * contact.curve.at(speed, per_log, log_slowest)
-                + (per_load * loaded + film) * speed)
+            sign * (loaded * contact.curve.at(speed, per_log, log_slowest) + (per_load * load + film) * speed)
         } else {
             0.0
         };
