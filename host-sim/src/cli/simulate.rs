@@ -14,6 +14,7 @@ use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::output_dir::OutputDir;
 use crate::files::rig_file::RigFile;
+use crate::files::strain_gauges::{FRICTION_ZERO, NORMAL_ZERO};
 use crate::input_error::InputError;
 use crate::lockstep::Setup;
 use crate::plant::{ElementParameters, PERIOD_S, left_out};
@@ -72,6 +73,15 @@ impl Simulate {
             eprintln!("rig: {}: {warning}", model.source);
         }
         provenance::note("seed of the sensors' noise", &experiment.seed.to_string());
+        let bridges = [
+            ("friction bridge", &rig.friction_bridge, "N m", FRICTION_ZERO),
+            ("normal force bridge", &rig.normal_bridge, "N", NORMAL_ZERO),
+        ];
+        for (what, bridge, unit, zero_share) in bridges {
+            if let Some(sensitivity) = bridge.sensitivity {
+                say(&format!("{what:22} {}", sensitivity.words(unit, zero_share)));
+            }
+        }
         let mut output = OutputDir::new(&self.out)?;
         let started = Instant::now();
         match &experiment.study {

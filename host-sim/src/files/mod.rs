@@ -18,4 +18,5 @@ pub mod overrides;
 pub mod plausible;
 pub mod rig_file;
 pub mod signal;
+pub mod strain_gauges;
 pub mod toml_tree;

@@ -5,13 +5,16 @@
 //! A bridge table left out is an ideal sensor; so is one half of it (`mode_hz` with `damping_ratio`, or
 //! `lowpass_hz`) where it is left out.
 //!
-//! Two entries can be given by their parts. The lever's gain by its arms, F_N = (τ/l1)(l2/l3): M1's torque τ on the arm
+//! Some entries can be given by their parts. The lever's gain by its arms, F_N = (τ/l1)(l2/l3): M1's torque τ on the arm
 //! `lever_l1_m` gives a force, which the lever `lever_l2_m` : `lever_l3_m` brings to the elements. The inertia that M2 turns by
-//! `inertia_discs` further discs of `inertia_disc_kg_m2` each, as the original rig has them.
+//! `inertia_discs` further discs of `inertia_disc_kg_m2` each, as the original rig has them. What a bridge gives at the
+//! converter's pin by `sensitivity_v_per_nm` (friction) and `sensitivity_v_per_n` (normal force), or by the beams, gauges and
+//! amplifier of a table `[friction_bridge.gauges]`, `[normal_bridge.gauges]`: see [`super::strain_gauges`].
 
 use std::path::Path;
 
 use super::overrides;
+use super::strain_gauges::{self, Sensitivity};
 use super::toml_tree::{Allowed, Document, FINITE, NOT_NEGATIVE, POSITIVE, TableReader};
 use crate::input_error::InputError;
 
@@ -34,6 +37,8 @@ pub struct Bridge {
     pub mode: Option<Mode>,
     /// Corner of the amplifier's second-order Butterworth low-pass; `None` is none.
     pub lowpass_hz: Option<f64>,
+    /// What the amplifier gives at the converter's pin; `None` is the assumed one.
+    pub sensitivity: Option<Sensitivity>,
 }
 
 impl Bridge {
@@ -233,8 +238,8 @@ impl<'a> Reading<'a> {
                 mode_hz: self.number(&pressure, "mode_hz", POSITIVE)?,
                 damping_ratio: self.number(&pressure, "damping_ratio", NOT_NEGATIVE)?,
             },
-            friction_bridge: bridge(friction_bridge.as_ref())?,
-            normal_bridge: bridge(normal_bridge.as_ref())?,
+            friction_bridge: bridge(friction_bridge.as_ref(), "sensitivity_v_per_nm", true)?,
+            normal_bridge: bridge(normal_bridge.as_ref(), "sensitivity_v_per_n", false)?,
             shaft: shaft.as_ref().map(|table| read_shaft(table, m2_inertia_kg_m2)).transpose()?,
             assumed: self.filled,
         };
@@ -277,7 +282,7 @@ fn inertia_discs(table: &TableReader<'_>) -> Result<f64, InputError> {
     }
 }
 
-fn bridge(table: Option<&TableReader<'_>>) -> Result<Bridge, InputError> {
+fn bridge(table: Option<&TableReader<'_>>, sensitivity: &str, of_torque: bool) -> Result<Bridge, InputError> {
     let Some(table) = table else { return Ok(Bridge::default()) };
     let mode_hz = table.number("mode_hz", POSITIVE)?;
     let damping_ratio = table.number("damping_ratio", NOT_NEGATIVE)?;
@@ -290,7 +295,7 @@ fn bridge(table: Option<&TableReader<'_>>) -> Result<Bridge, InputError> {
         }
         (None, Some(_)) => return Err(table.missing("mode_hz", "both mode_hz and damping_ratio, or neither")),
     };
-    Ok(Bridge { mode, lowpass_hz })
+    Ok(Bridge { mode, lowpass_hz, sensitivity: strain_gauges::read(table, sensitivity, of_torque)? })
 }
 
 fn read_shaft(table: &TableReader<'_>, inertia_kg_m2: f64) -> Result<Shaft, InputError> {

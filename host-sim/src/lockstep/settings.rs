@@ -5,10 +5,11 @@
 //! surprise to it.
 
 use crate::files::model_file::ModelFile;
-use crate::files::rig_file::{Motor, RigFile};
+use crate::files::rig_file::{Bridge, Motor, RigFile};
+use crate::files::strain_gauges::{FRICTION_ZERO, NORMAL_ZERO};
 use model_core::control::ControlSettings;
 use model_core::control::observer::ModelParameters;
-use model_core::control::settings::DriveSettings;
+use model_core::control::settings::{BridgeSettings, DriveSettings};
 
 /// Settings for a rig, with the observer on a model.
 #[must_use]
@@ -29,6 +30,14 @@ pub fn control_settings(rig: &RigFile, observer: &ModelFile) -> ControlSettings 
     settings.speed_loop.bearing_viscous_nm_s = rig.bearing_viscous_nm_s_per_rad as f32;
     settings.m1_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
     settings.m2_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
+    let spanning = |to: &mut BridgeSettings, bridge: &Bridge, zero_share: f64| {
+        if let Some((low, high)) = bridge.sensitivity.map(|s| s.range(zero_share)) {
+            let tare_limit = to.tare_limit;
+            *to = BridgeSettings { tare_limit, ..BridgeSettings::spanning(low as f32, high as f32) };
+        }
+    };
+    spanning(&mut settings.friction_bridge, &rig.friction_bridge, FRICTION_ZERO);
+    spanning(&mut settings.normal_bridge, &rig.normal_bridge, NORMAL_ZERO);
     settings.observer.bridge_lowpass_hz = rig.friction_bridge.lowpass_hz.unwrap_or(0.0) as f32;
     settings.observer.model = ModelParameters::Elements(observer.friction().cast());
     settings

@@ -3,12 +3,14 @@
 use super::effects;
 use super::elements::ElementParameters;
 use super::parameters::{
-    BearingParameters, BridgeParameters, DiscParameters, DriveParameters, GeometryParameters, ModeParameters,
-    NoiseParameters, PlantParameters, PressureParameters, ShaftParameters, Substeps,
+    AnalogueParameters, BearingParameters, BridgeParameters, DiscParameters, DriveParameters,
+    GeometryParameters, ModeParameters, NoiseParameters, PlantParameters, PressureParameters,
+    ShaftParameters, Substeps,
 };
 use crate::files::experiment_file::PlantOptions;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::{Bridge, Motor, RigFile};
+use crate::files::strain_gauges::{FRICTION_ZERO, NORMAL_ZERO};
 
 impl PlantParameters {
     /// The plant of a rig with elements of a model. What neither file names keeps its assumed value.
@@ -48,6 +50,7 @@ impl PlantParameters {
             },
             friction_bridge: bridge(&rig.friction_bridge),
             normal_bridge: bridge(&rig.normal_bridge),
+            analogue: analogue(rig, assumed.analogue),
             counts_per_rev: rig.pulses_per_rev.saturating_mul(4),
             noise: if options.sensor_noise { assumed.noise } else { NoiseParameters::none() },
             substeps: Substeps { busy: options.substeps, ..assumed.substeps },
@@ -56,6 +59,18 @@ impl PlantParameters {
             ..assumed
         }
     }
+}
+
+/// Ranges of both bridges, where the rig file says what their amplifiers give.
+fn analogue(rig: &RigFile, assumed: AnalogueParameters) -> AnalogueParameters {
+    let mut analogue = assumed;
+    if let Some(bridge) = rig.friction_bridge.sensitivity {
+        analogue.friction_full_scale_nm = bridge.range(FRICTION_ZERO).1;
+    }
+    if let Some(bridge) = rig.normal_bridge.sensitivity {
+        (analogue.normal_low_n, analogue.normal_high_n) = bridge.range(NORMAL_ZERO);
+    }
+    analogue
 }
 
 impl ElementParameters {

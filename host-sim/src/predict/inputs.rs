@@ -76,7 +76,7 @@ mod tests {
     fn the_delay_of_the_normal_bridge_is_taken_back() {
         let mut rig = RigFile::assumed_rig(&[]).unwrap();
         let mode = Some(Mode { mode_hz: 900.0, damping_ratio: 0.5 });
-        rig.normal_bridge = Bridge { mode, lowpass_hz: Some(1000.0) };
+        rig.normal_bridge = Bridge { mode, lowpass_hz: Some(1000.0), sensitivity: None };
         let time_s: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
         let load = |t: f64| 80.0 + 20.0 * (std::f64::consts::TAU * 60.0 * t).sin();
         let mut bridge = BridgeModel::new(&rig.normal_bridge, 80.0);

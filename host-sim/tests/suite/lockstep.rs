@@ -3,7 +3,7 @@
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
-use host_sim::lockstep::{Recording, Setup, run};
+use host_sim::lockstep::{Frame, Recording, Setup, run};
 use host_sim::summary::{RunFacts, Summary, summarise};
 use model_core::control::{Fault, Mode};
 
@@ -47,6 +47,25 @@ fn friction_overshoots_in_figs_18_to_21_and_at_low_speed_after_the_normal_force_
         let static_curve = 0.5 + 0.7 * (-(speed / 0.5f64).sqrt()).exp();
         assert!((v / static_curve - 1.0).abs() < 2e-3, "{name}: {v} against {static_curve}");
     }
+}
+
+#[test]
+fn bridges_given_by_beams_and_gauges_read_what_is_there() {
+    let rig = RigFile::parse("gauged.toml", include_str!("../../rigs/gauged.toml")).unwrap();
+    let model = ModelFile::assumed(&[]).unwrap();
+    let experiment = ExperimentFile::named_or_read("fig20", &[]).unwrap();
+    let setup = Setup::from_files(&experiment, &rig, &model, &model).unwrap();
+    // 1.65 V over 256 · 5 V · 2 · 53.57 µm/m per N m; 3.3 V over 1000 · 5 V · 2 · 1.1905 µm/m per N.
+    let analogue = setup.plant.analogue;
+    assert!((analogue.friction_full_scale_nm - 12.031_25).abs() < 1e-9, "{analogue:?}");
+    assert!((analogue.normal_high_n - analogue.normal_low_n - 277.2).abs() < 1e-9, "{analogue:?}");
+    let recording = run(&setup, |_, _| {}).unwrap();
+    assert_eq!(recording.fault, None);
+    let mean = |of: &dyn Fn(&Frame) -> f64| recording.frames[90_000..].iter().map(of).sum::<f64>() / 10_000.0;
+    // Noise over ten thousand samples, and half a code.
+    let normal_n = mean(&|f| f64::from(f.record.normal_force_n) - f.truth.normal_force_n);
+    let friction_nm = mean(&|f| f64::from(f.record.friction_torque_nm) - f.truth.friction_torque_nm);
+    assert!(normal_n.abs() < 5e-3 && friction_nm.abs() < 5e-4, "{normal_n} N, {friction_nm} N m");
 }
 
 #[test]
