@@ -10,10 +10,11 @@ impl ExperimentFile {
     /// The experiment for the control core of this rig.
     pub fn for_core(&self, rig: &RigFile) -> Result<Experiment, InputError> {
         let Study::ClosedLoop { m1, m2 } = &self.study else {
-            return Err(InputError::new("needs no motors and cannot be run on a rig")
-                .file(self.source.as_str())
-                .key("kind")
-                .allowed("closed_loop"));
+            let why = match &self.study {
+                Study::TwoMotors { .. } => "is for the original rig, which has no press",
+                _ => "needs no motors and cannot be run on a rig",
+            };
+            return Err(InputError::new(why).file(self.source.as_str()).key("kind").allowed("closed_loop"));
         };
         let mut experiment = Experiment { duration_ticks: ticks(self.duration_s), ..Experiment::default() };
         for segment in m1 {

@@ -1,7 +1,7 @@
 //! The experiment file: what each motor is asked for over time, or a study without motors.
 //!
-//! Three kinds. `closed_loop` (the default) has lists of segments, `[[m1]]` and `[[m2]]`; a segment lasts
-//! until the next one of its motor starts. `patch_crossing` draws elements across a contact patch at a
+//! Four kinds. `closed_loop` (the default) has lists of segments, `[[m1]]` and `[[m2]]`; a segment lasts
+//! until the next one of its motor starts. `two_motors` has the same lists, of torques, for the original rig. `patch_crossing` draws elements across a contact patch at a
 //! prescribed slip, `speed_sweep` takes the steady friction over speed; both need no motors.
 //! Quantities carry their unit in the key: `torque_nm`, `torque_fraction` (of the motor's rated torque),
 //! `speed_rad_s`, `speed_rpm`. A segment gives its value (`torque_nm = 3.0`), a ramp also where it ends
@@ -18,7 +18,7 @@ use crate::input_error::InputError;
 pub const CONTROL_PERIOD_S: f64 = 1e-4;
 
 /// The experiments that come with the tool.
-pub const BUILT_IN: [(&str, &str); 8] = [
+pub const BUILT_IN: [(&str, &str); 9] = [
     ("fig18", include_str!("../experiments/fig18.toml")),
     ("fig19", include_str!("../experiments/fig19.toml")),
     ("fig20", include_str!("../experiments/fig20.toml")),
@@ -27,6 +27,7 @@ pub const BUILT_IN: [(&str, &str); 8] = [
     ("fig23", include_str!("../experiments/fig23.toml")),
     ("fig26", include_str!("../experiments/fig26.toml")),
     ("fig27", include_str!("../experiments/fig27.toml")),
+    ("original", include_str!("../experiments/original.toml")),
 ];
 
 /// What a segment prescribes.
@@ -68,6 +69,20 @@ pub enum Course {
         /// Phase at the segment's start.
         phase_rad: f64,
     },
+}
+
+impl Course {
+    /// Value at a time after the segment's start.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> f64 {
+        match *self {
+            Self::Constant { value } => value,
+            Self::Ramp { from, to, ramp_s } => from + (to - from) * (time_s / ramp_s).clamp(0.0, 1.0),
+            Self::Sine { offset, amplitude, angular_frequency_rad_s, phase_rad } => {
+                offset + amplitude * (angular_frequency_rad_s * time_s + phase_rad).sin()
+            }
+        }
+    }
 }
 
 /// A stretch of an experiment for one motor.
@@ -112,6 +127,13 @@ pub struct SpeedSweep {
 pub enum Study {
     /// Both motors in closed loop.
     ClosedLoop {
+        /// Segments of M1, in order.
+        m1: Vec<Segment>,
+        /// Segments of M2, in order.
+        m2: Vec<Segment>,
+    },
+    /// Torques of both motors of the original rig.
+    TwoMotors {
         /// Segments of M1, in order.
         m1: Vec<Segment>,
         /// Segments of M2, in order.
@@ -162,6 +184,7 @@ pub struct ExperimentFile {
 #[derive(Clone, Copy)]
 enum Kind {
     ClosedLoop,
+    TwoMotors,
     PatchCrossing,
     SpeedSweep,
 }
@@ -197,6 +220,7 @@ impl ExperimentFile {
         let title = text("title")?.unwrap_or_default();
         let kinds = [
             ("closed_loop", Kind::ClosedLoop),
+            ("two_motors", Kind::TwoMotors),
             ("patch_crossing", Kind::PatchCrossing),
             ("speed_sweep", Kind::SpeedSweep),
         ];
@@ -213,10 +237,11 @@ impl ExperimentFile {
             study: match kind {
                 Kind::PatchCrossing => Study::PatchCrossing(read_patch_crossing(root)?),
                 Kind::SpeedSweep => Study::SpeedSweep(read_speed_sweep(root)?),
-                Kind::ClosedLoop => Study::ClosedLoop { m1: Vec::new(), m2: Vec::new() },
+                // Filled below, once the duration is known.
+                Kind::ClosedLoop | Kind::TwoMotors => Study::ClosedLoop { m1: Vec::new(), m2: Vec::new() },
             },
         };
-        if let Kind::ClosedLoop = kind {
+        if let Kind::ClosedLoop | Kind::TwoMotors = kind {
             let duration =
                 Allowed { check: |x| (CONTROL_PERIOD_S..=3600.0).contains(&x), words: "0.0001 to 3600 s" };
             experiment.duration_s = root.required_number("duration_s", duration)?;
@@ -224,10 +249,11 @@ impl ExperimentFile {
             if let Some(table) = root.table("plant")? {
                 experiment.plant = read_plant(&table)?;
             }
-            experiment.study = Study::ClosedLoop {
-                m1: read_segments(root, "m1", experiment.duration_s)?,
-                m2: read_segments(root, "m2", experiment.duration_s)?,
-            };
+            let in_loop = matches!(kind, Kind::ClosedLoop);
+            let m1 = read_segments(root, "m1", experiment.duration_s, false)?;
+            let m2 = read_segments(root, "m2", experiment.duration_s, in_loop)?;
+            experiment.study =
+                if in_loop { Study::ClosedLoop { m1, m2 } } else { Study::TwoMotors { m1, m2 } };
         }
         root.finish()?;
         Ok(experiment)
@@ -294,6 +320,7 @@ fn read_segments(
     root: &TableReader<'_>,
     motor: &'static str,
     end_s: f64,
+    may_be_speed: bool,
 ) -> Result<Vec<Segment>, InputError> {
     let tables = root.tables(motor)?;
     if tables.is_empty() {
@@ -301,7 +328,7 @@ fn read_segments(
     }
     let mut segments: Vec<Segment> = Vec::new();
     for table in &tables {
-        let segment = read_segment(table, motor == "m2")?;
+        let segment = read_segment(table, may_be_speed)?;
         let refuse = |problem: String, allowed: String| Err(table.error("start_s", problem).allowed(allowed));
         match segments.last() {
             None if segment.start_s != 0.0 => {

@@ -20,3 +20,4 @@ pub mod rig_file;
 pub mod signal;
 pub mod strain_gauges;
 pub mod toml_tree;
+pub mod two_motor_file;

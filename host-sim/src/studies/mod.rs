@@ -7,3 +7,4 @@ pub mod quarter_car;
 pub mod readings;
 pub mod rivals;
 pub mod speed_sweep;
+pub mod two_motors;
