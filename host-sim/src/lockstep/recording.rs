@@ -7,6 +7,10 @@ use crate::plant::{PERIOD_S, Truth};
 use model_core::control::{Fault, LimitSet, Record};
 use rig_link::telemetry::CHANNELS;
 
+/// Control periods of a second; a whole number.
+const TICKS_PER_S: f64 = 1e4;
+const _: () = assert!((TICKS_PER_S * PERIOD_S - 1.0).abs() < 1e-12);
+
 /// One tick of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -37,7 +41,7 @@ impl Recording {
     #[allow(clippy::cast_precision_loss)]
     pub fn time_s(&self, frame: usize) -> f64 {
         // Dividing by a whole number gives the nearest f64 to the decimal time.
-        frame as f64 / (1.0 / PERIOD_S).round()
+        frame as f64 / TICKS_PER_S
     }
 
     /// One signal over all frames.
@@ -49,18 +53,8 @@ impl Recording {
     /// numbers of single precision are written with the digits they have.
     #[must_use]
     pub fn log(&self, every: usize, counts_per_rev: u32) -> Log {
-        self.table(every, counts_per_rev, widen)
-    }
-
-    /// All ticks as signals for a computation: like [`Self::log`], but not prepared for being written.
-    #[must_use]
-    pub fn signals(&self, counts_per_rev: u32) -> Log {
-        self.table(1, counts_per_rev, f64::from)
-    }
-
-    fn table(&self, every: usize, counts_per_rev: u32, double: fn(f32) -> f64) -> Log {
         let picked = || self.frames.iter().step_by(every.max(1));
-        let single = |f: fn(&Record) -> f32| picked().map(|x| double(f(&x.record))).collect::<Vec<_>>();
+        let single = |f: fn(&Record) -> f32| picked().map(|x| widen(f(&x.record))).collect::<Vec<_>>();
         let angle =
             |f: fn(&Record) -> i64| picked().map(|x| angle_rad(f(&x.record), counts_per_rev)).collect();
         let mut log = Log::default();
@@ -78,6 +72,20 @@ impl Recording {
         for channel in CHANNELS {
             log.set_numbers(channel.column, single(channel.of_record));
         }
+        log
+    }
+
+    /// All ticks of what the figures of an experiment are taken from: motion, normal force, friction. Unlike [`Self::log`]
+    /// not prepared for being written.
+    #[must_use]
+    pub fn signals(&self, counts_per_rev: u32) -> Log {
+        let single = |f: fn(&Record) -> f32| self.column(|x| f64::from(f(&x.record)));
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..self.frames.len()).map(|k| self.time_s(k)).collect());
+        log.set_signal(Signal::M2Angle, self.column(|x| angle_rad(x.record.m2_count, counts_per_rev)));
+        log.set_signal(Signal::M2Speed, single(|r| r.m2_speed_rad_s));
+        log.set_signal(Signal::NormalForce, single(|r| r.normal_force_n));
+        log.set_signal(Signal::FrictionTorque, single(|r| r.friction_torque_nm));
         log
     }
 }

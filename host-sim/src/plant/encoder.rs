@@ -50,9 +50,12 @@ impl Encoder {
 
     /// The count at an angle.
     #[inline]
-    #[allow(clippy::cast_possible_truncation)]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
     pub(crate) fn count(&self, angle_rad: f64) -> i64 {
-        (angle_rad * self.counts_per_rad).floor() as i64
+        let counts = angle_rad * self.counts_per_rad;
+        // ⌊x⌋ without a call into the C library, which is what `floor` is where the target has no instruction for it.
+        let towards_zero = counts as i64;
+        towards_zero - i64::from(towards_zero as f64 > counts)
     }
 
     /// Edges of one sweep in order of time.

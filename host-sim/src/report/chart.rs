@@ -141,8 +141,12 @@ impl Chart {
     }
 
     fn trace(&self, row: usize, line: &Line, first: bool, fine: &[(f64, f64)]) -> String {
+        // Places of the fine stretches: x rises where the line is simplified.
+        let place = |x: f64, beyond: fn(f64, f64) -> bool| line.x.partition_point(|here| beyond(*here, x));
+        let stretches: Vec<(usize, usize)> =
+            fine.iter().map(|(from, to)| (place(*from, |x, a| x < a), place(*to, |x, b| x <= b))).collect();
         let tolerance = |i: usize| {
-            let inside = fine.iter().any(|(from, to)| (*from..=*to).contains(&line.x[i]));
+            let inside = stretches.iter().any(|(from, to)| (*from..*to).contains(&i));
             if inside { line.fine_tolerance } else { line.tolerance }
         };
         let kept = if self.is_exact() {
@@ -179,11 +183,79 @@ fn decimals(tolerance: f64) -> usize {
     if tolerance > 0.0 { (1.0 - tolerance.log10()).ceil().clamp(0.0, 12.0) as usize } else { 9 }
 }
 
+/// 10^n, exact.
+const POWERS: [u32; 10] =
+    [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000, 1_000_000_000];
+/// Largest value in units of its last decimal that is rounded in binary: the product then errs by less than 1e-6.
+const MOST_UNITS: f64 = 1e9;
+
+/// The value rounded to so many decimals, in units of the last; `None` where that is too large for binary rounding or too near a
+/// tie to trust it.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn units(value: f64, decimals: usize) -> Option<u32> {
+    let units = value.abs() * f64::from(*POWERS.get(decimals)?);
+    if units >= MOST_UNITS {
+        return None;
+    }
+    let whole = units as u32;
+    let part = units - f64::from(whole);
+    ((part - 0.5).abs() > 1e-6).then_some(whole + u32::from(part > 0.5))
+}
+
 fn push(text: &mut String, value: f64, decimals: usize) {
     if !value.is_finite() {
         text.push_str("null");
         return;
     }
+    // A report has some hundred thousand numbers, and the formatter of the standard library is exact at the cost of long
+    // arithmetic wherever a value has a short decimal. Both ways give the same bytes.
+    match units(value, decimals) {
+        Some(units) => push_units(text, value < 0.0, units, decimals),
+        None => push_exactly(text, value, decimals),
+    }
+}
+
+/// `units` of the last of so many decimals, without zeros at the end.
+fn push_units(text: &mut String, negative: bool, units: u32, decimals: usize) {
+    let scale = POWERS[decimals];
+    let (whole, mut part) = (units / scale, units % scale);
+    if negative && units > 0 {
+        text.push('-');
+    }
+    text.push_str(itoa(whole, &mut [0; 10]));
+    if part == 0 {
+        return;
+    }
+    let mut places = decimals;
+    while part.is_multiple_of(10) {
+        part /= 10;
+        places -= 1;
+    }
+    text.push('.');
+    let mut buffer = [0; 10];
+    let digits = itoa(part, &mut buffer);
+    (digits.len()..places).for_each(|_| text.push('0'));
+    text.push_str(digits);
+}
+
+/// The digits of a number.
+fn itoa(mut value: u32, buffer: &mut [u8; 10]) -> &str {
+    let mut from = buffer.len();
+    loop {
+        from -= 1;
+        #[allow(clippy::cast_possible_truncation)]
+        let digit = (value % 10) as u8;
+        buffer[from] = b'0' + digit;
+        value /= 10;
+        if value == 0 {
+            break;
+        }
+    }
+    // Digits are text.
+    std::str::from_utf8(&buffer[from..]).unwrap_or_default()
+}
+
+fn push_exactly(text: &mut String, value: f64, decimals: usize) {
     let start = text.len();
     // Writing to a string cannot fail.
     let _ = write!(text, "{value:.decimals$}");
@@ -226,6 +298,27 @@ mod tests {
         text.push(' ');
         push(&mut text, f64::NAN, 2);
         assert_eq!(text, "1.23 0 100 null");
+    }
+
+    #[test]
+    fn numbers_rounded_in_binary_have_the_digits_of_the_exact_ones() {
+        let (mut x, mut binary) = (1e-9_f64, 0);
+        while x < 1e7 {
+            x *= 1.003_7;
+            // Also what a time of the control period looks like, and ties.
+            for value in
+                [x, -x, (x * 1e4).round() / 1e4, (x * 8.0).round() / 8.0, (x * 100.0).floor() / 100.0 + 0.005]
+            {
+                for decimals in 0..=9 {
+                    let (mut fast, mut exact) = (String::new(), String::new());
+                    push(&mut fast, value, decimals);
+                    push_exactly(&mut exact, value, decimals);
+                    assert_eq!(fast, exact, "{value:?} to {decimals}");
+                    binary += u32::from(units(value, decimals).is_some());
+                }
+            }
+        }
+        assert!(binary > 100_000, "{binary}");
     }
 
     #[test]

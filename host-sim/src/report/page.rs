@@ -48,7 +48,8 @@ impl Page {
     /// The page as HTML.
     #[must_use]
     pub fn to_html(&self) -> String {
-        let mut body = String::new();
+        // A chart of a closed loop takes some hundred kilobytes.
+        let mut body = String::with_capacity(1 << 19);
         let mut contents = String::new();
         let mut charts = 0;
         let mut headings = 0;

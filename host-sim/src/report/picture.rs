@@ -57,14 +57,21 @@ fn draw_panel(
     last: bool,
 ) -> Drawn<()> {
     let shown = chart.windows.first().map(|window| window.range);
+    // A line that is a function of a rising abscissa has its columns at places of the record, and no point of it is copied.
+    let rising = !(chart.log_x || chart.plane) && chart.counts.is_empty();
     let lines: Vec<(&str, Vec<(f64, f64)>)> = panel
         .lines
         .iter()
         .map(|line| {
-            let points: Vec<(f64, f64)> = line
-                .x
+            let (from, to) = if rising { inside(&line.x, shown) } else { (0, line.x.len()) };
+            let (from, to) = (from.min(line.y.len()), to.min(line.y.len()));
+            let (x, y) = (&line.x[from..to], &line.y[from..to]);
+            if rising && y.iter().all(|y| y.is_finite()) {
+                return (line.name.as_str(), columns(x, y));
+            }
+            let points: Vec<(f64, f64)> = x
                 .iter()
-                .zip(&line.y)
+                .zip(y)
                 .map(|(x, y)| (if chart.log_x { x.log10() } else { *x }, *y))
                 .filter(|(x, y)| x.is_finite() && y.is_finite())
                 .filter(|(x, _)| shown.is_none_or(|(from, to)| chart.log_x || (from..=to).contains(x)))
@@ -112,10 +119,38 @@ fn draw_panel(
     Ok(())
 }
 
+/// First and last place of a rising abscissa within a range.
+fn inside(x: &[f64], range: Option<(f64, f64)>) -> (usize, usize) {
+    let Some((from, to)) = range else { return (0, x.len()) };
+    let first = x.partition_point(|x| *x < from);
+    (first, first + x[first..].partition_point(|x| *x <= to))
+}
+
 fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     // A line that is flat has some room too.
     (low <= high).then_some(if high > low { (low, high) } else { (low - 0.5, high + 0.5) })
+}
+
+/// [`envelope`] of a function over a rising abscissa.
+fn columns(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    let size = y.len().div_ceil(COLUMNS).max(1);
+    if size <= 2 {
+        return x.iter().copied().zip(y.iter().copied()).collect();
+    }
+    let column = |from: usize| {
+        let (mut low, mut high) = (from, from);
+        for (at, y_here) in y.iter().enumerate().take((from + size).min(y.len())).skip(from + 1) {
+            if y_here.total_cmp(&y[low]).is_lt() {
+                low = at;
+            }
+            if y_here.total_cmp(&y[high]).is_ge() {
+                high = at;
+            }
+        }
+        [low.min(high), low.max(high)].map(|at| (x[at], y[at]))
+    };
+    (0..y.len()).step_by(size).flat_map(column).collect()
 }
 
 /// The lowest and the highest point of each column.
@@ -164,6 +199,26 @@ mod tests {
         let svg = svg(&chart());
         assert!(svg.starts_with("<svg") && svg.contains("time, s") && svg.contains("torque, N m"), "{svg}");
         assert!(svg.contains("measured") && svg.len() < 40_000, "{}", svg.len());
+    }
+
+    #[test]
+    fn the_part_of_a_record_that_is_shown_has_both_its_ends() {
+        let x = [0.0, 1.0, 2.0, 3.0, 4.0];
+        assert_eq!(inside(&x, Some((1.0, 3.0))), (1, 4));
+        assert_eq!(inside(&x, Some((0.5, 9.0))), (1, 5));
+        assert_eq!(inside(&x, Some((5.0, 9.0))), (5, 5));
+        assert_eq!(inside(&x, None), (0, 5));
+    }
+
+    #[test]
+    fn columns_over_a_rising_abscissa_are_the_envelope_of_the_points() {
+        for count in [1_u32, 599, 601, 20_000, 20_017] {
+            let x: Vec<f64> = (0..count).map(f64::from).collect();
+            // With plateaus, where the first of the lowest and the last of the highest count.
+            let y: Vec<f64> = x.iter().map(|x| (7.0 * (0.03 * x).sin()).round()).collect();
+            let points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+            assert_eq!(columns(&x, &y), envelope(&points), "{count} points");
+        }
     }
 
     #[test]

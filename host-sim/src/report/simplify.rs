@@ -14,18 +14,19 @@ pub fn keep(x: &[f64], y: &[f64], tolerance: impl Fn(usize) -> f64) -> Vec<usize
     }
     let mut kept = vec![0];
     let (mut anchor, mut low, mut high) = (0, f64::NEG_INFINITY, f64::INFINITY);
-    for i in 1..n {
-        let dx = x[i] - x[anchor];
-        let slope = (y[i] - y[anchor]) / dx;
+    let (mut before, mut start) = ((x[0], y[0]), (x[0], y[0]));
+    for (i, point) in x.iter().copied().zip(y.iter().copied()).enumerate().skip(1) {
+        let slope = (point.1 - start.1) / (point.0 - start.0);
         if !(low..=high).contains(&slope) && i - anchor > 1 {
-            anchor = i - 1;
+            (anchor, start) = (i - 1, before);
             kept.push(anchor);
             (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
         }
-        let dx = x[i] - x[anchor];
+        let dx = point.0 - start.0;
         let t = tolerance(i);
-        low = low.max((y[i] - t - y[anchor]) / dx);
-        high = high.min((y[i] + t - y[anchor]) / dx);
+        low = low.max((point.1 - t - start.1) / dx);
+        high = high.min((point.1 + t - start.1) / dx);
+        before = point;
     }
     kept.push(n - 1);
     kept
