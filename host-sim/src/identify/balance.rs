@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::contact::noise::slow_share;
 use super::contact::problem::{FREEDOM, SCALES, TYPICAL_SCALE, log_mean_exp};
-use super::filters::median_magnitude;
+use super::filters::{self, local_maximum, median_magnitude};
 use super::linear::{self, dot};
 use super::term::Parameter;
 
@@ -90,6 +90,26 @@ pub struct Balance {
     pub starts: Vec<usize>,
 }
 
+/// What a log gives to a balance.
+pub struct LogRows<'l> {
+    /// Width of the balance's filter, samples.
+    pub width: f64,
+    /// Step, s.
+    pub step_s: f64,
+    /// Points at which the balance says nothing.
+    pub left_out: Vec<bool>,
+    /// Deviations from each named source at a point.
+    pub noise: Box<dyn Fn(usize) -> Vec<f64> + 'l>,
+}
+
+/// Rows are taken every so many samples for each width of the filter: closer ones say the same.
+const ROWS_PER_WIDTH: f64 = 0.5;
+/// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
+/// eighth of its largest.
+const CLEAR_WIDTHS: f64 = 2.0;
+/// Rows that count as one before the residuals tell it: neighbours share most of their filter.
+const FIRST_TEMPER: f64 = 3.0;
+
 /// A solved set.
 #[derive(Debug, Clone)]
 pub struct Solved {
@@ -106,6 +126,42 @@ pub struct Solved {
 }
 
 impl Balance {
+    /// From the filtered sides and what the logs say of their rows; `scale` is the usual size of the torques.
+    pub fn new(
+        response: Vec<f64>,
+        base: Vec<(Parameter, Vec<f64>)>,
+        logs: &[LogRows<'_>],
+        scale: f64,
+    ) -> Self {
+        let (mut deviation, mut used, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut row_step_s = f64::INFINITY;
+        for log in logs {
+            let (from, count) = (deviation.len(), log.left_out.len());
+            starts.push(from);
+            let whole = |i| (log.noise)(i).iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12);
+            deviation.extend((0..count).map(whole));
+            let marked: Vec<f64> = log.left_out.iter().map(|out| f64::from(u8::from(*out))).collect();
+            let near = local_maximum(&marked, (CLEAR_WIDTHS * log.width).ceil() as usize);
+            let every = (ROWS_PER_WIDTH * log.width).round().max(1.0) as usize;
+            let border = (filters::REACH * log.width).ceil() as usize;
+            row_step_s = row_step_s.min(every as f64 * log.step_s);
+            let rows = (border..count.saturating_sub(border)).step_by(every);
+            used.extend(rows.filter(|i| near[*i] == 0.0).map(|i| from + i));
+        }
+        let first_deviation = deviation.clone();
+        Self {
+            response,
+            base,
+            deviation,
+            first_deviation,
+            used,
+            scale,
+            temper: FIRST_TEMPER,
+            row_step_s,
+            starts,
+        }
+    }
+
     /// Solves a set of alternatives.
     pub fn solve(&self, alternatives: &[Alternative], set: &[usize]) -> Solved {
         let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();

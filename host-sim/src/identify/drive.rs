@@ -5,10 +5,10 @@
 //! Every term goes through one Gaussian, whose derivatives give ω and ω̇ from the angle; it is as narrow as the angle's
 //! noise allows. Rows near standstill are left out: there the bearing's friction is a reaction.
 
-use super::balance::Balance;
+use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::contact::log::unwrapped;
-use super::filters::{gaussian, local_maximum, rms};
+use super::filters::{gaussian, largest_change, rms, white_share};
 use super::grid::Grid;
 use super::noise;
 use super::term::Parameter;
@@ -23,8 +23,10 @@ const WIDE_ENOUGH: f64 = 4.0;
 const STANDSTILL: f64 = 0.01;
 /// … or than so many deviations of the speed's noise.
 const STANDSTILL_NOISES: f64 = 5.0;
-/// Rows are taken every so many samples for each width of the filter: closer ones say the same.
-const ROWS_PER_WIDTH: f64 = 0.5;
+/// What no model of a drive is more accurate than, relative to its own effort.
+const LEAST_NOISE: f64 = 2e-3;
+/// Share of the filtered change a sample that is not known, since the channels are not sampled at one instant.
+const BETWEEN_SAMPLES: f64 = 0.1;
 /// The channels of a log are sampled within this time of each other, s: a converter's scan.
 const SCAN_S: f64 = 3e-5;
 /// The friction bridge's delay is known within this time by the rig file, s.
@@ -115,7 +117,7 @@ impl DriveLog {
         let inertial = |width: f64| {
             inertia * angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2)
         };
-        let fits = |width: &f64| inertial(*width) < 0.5 * effort_noise * (0.5 / (root_pi * width)).sqrt();
+        let fits = |width: &f64| inertial(*width) < 0.5 * effort_noise * white_share(*width);
         let (narrowest, widest) = (if contact { WIDTHS[2] } else { WIDTHS[0] }, WIDTHS[5]);
         let (width, inertial_noise) = if inertia.is_finite() {
             // A wider one would take out what ripples; what the acceleration's noise then makes is a noise of its own.
@@ -269,58 +271,26 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         base.push((wide("friction_late_s", 0.0, BRIDGE_LATE_S), concat(&|log| rate(log, &friction(log)))));
         base.push((wide("friction_gain", 0.0, GAIN), concat(&|log| log.filtered(&friction(log)))));
     }
-    let mut deviation = Vec::new();
-    let mut used = Vec::new();
-    let mut starts = Vec::new();
-    let mut row_step_s = f64::INFINITY;
-    for log in logs {
-        let from = deviation.len();
-        starts.push(from);
-        let change = |values: &[f64]| {
-            local_maximum(&gaussian(values, log.width, 1).iter().map(|d| d.abs()).collect::<Vec<_>>(), 2)
-        };
-        let effort_change = change(&log.effort);
-        let friction_change = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| change(f));
-        let white = deviation_of(contact, &log.effort)
-            .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
-        let filtered_noise = white * (0.5 / (std::f64::consts::PI.sqrt() * log.width)).sqrt();
-        for i in 0..log.len() {
-            let n = [
-                filtered_noise,
-                log.inertial_noise,
-                2e-3 * own,
-                0.1 * effort_change[i],
-                0.1 * friction_change[i],
-            ];
-            deviation.push(n.iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12));
-        }
-        // What the derivative of a Gaussian lets through of white noise.
-        let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
-        let speed_noise = deviation_of(contact, &log.position) * passes / log.grid.step_s;
-        let standstill = (STANDSTILL * v).max(STANDSTILL_NOISES * speed_noise);
-        let stands: Vec<f64> = (0..log.len())
-            .map(|i| f64::from(u8::from(log.speed[i].abs() < standstill || !log.usable[i])))
-            .collect();
-        let near = local_maximum(&stands, (2.0 * log.width).ceil() as usize);
-        let every = (ROWS_PER_WIDTH * log.width).round().max(1.0) as usize;
-        let border = (4.0 * log.width).ceil() as usize;
-        row_step_s = row_step_s.min(every as f64 * log.grid.step_s);
-        used.extend(
-            (border..log.len().saturating_sub(border))
-                .step_by(every)
-                .filter(|i| near[*i] == 0.0)
-                .map(|i| from + i),
-        );
-    }
-    Balance {
-        response: concat(&response),
-        base,
-        first_deviation: deviation.clone(),
-        deviation,
-        used,
-        scale: scales.effort,
-        temper: 3.0,
-        row_step_s,
-        starts,
-    }
+    let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, contact, scales)).collect();
+    Balance::new(concat(&response), base, &rows, scales.effort)
+}
+
+/// Rows of a log: noise from named sources; near standstill the bearing's friction is a reaction.
+fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'l> {
+    let effort_change = largest_change(&log.effort, log.width);
+    let friction_change =
+        log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| largest_change(f, log.width));
+    let white = deviation_of(contact, &log.effort)
+        .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
+    let (white, form) = (white * white_share(log.width), LEAST_NOISE * scales.own);
+    let noise = move |i: usize| {
+        let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
+        vec![white, log.inertial_noise, form, between.0, between.1]
+    };
+    // What the derivative of a Gaussian lets through of white noise.
+    let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
+    let speed_noise = deviation_of(contact, &log.position) * passes / log.grid.step_s;
+    let standstill = (STANDSTILL * scales.speed).max(STANDSTILL_NOISES * speed_noise);
+    let left_out = log.speed.iter().zip(&log.usable).map(|(v, used)| v.abs() < standstill || !used).collect();
+    LogRows { width: log.width, step_s: log.grid.step_s, left_out, noise: Box::new(noise) }
 }

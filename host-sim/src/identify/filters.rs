@@ -2,7 +2,7 @@
 //! equation see the same one and no noise is differentiated on one side only.
 
 /// A Gaussian is cut off after so many standard deviations: what is left out is 6e-5 of its area.
-const REACH: f64 = 4.0;
+pub(super) const REACH: f64 = 4.0;
 
 /// Values filtered with a Gaussian of standard deviation `width` (samples), or with its derivative of order 0 to 3
 /// (per sample). Beyond its ends the signal is mirrored.
@@ -62,6 +62,16 @@ fn kernel(width: f64, order: usize) -> Vec<f64> {
         }
     };
     places().map(|x| (b + c * x * x) * x.powi(odd) * weight(x)).collect()
+}
+
+/// Largest magnitude of the derivative behind a Gaussian of this width within two samples, per sample.
+pub fn largest_change(values: &[f64], width: f64) -> Vec<f64> {
+    local_maximum(&gaussian(values, width, 1).iter().map(|d| d.abs()).collect::<Vec<_>>(), 2)
+}
+
+/// Share of white noise that a Gaussian of this width leaves.
+pub fn white_share(width: f64) -> f64 {
+    (0.5 / (std::f64::consts::PI.sqrt() * width)).sqrt()
 }
 
 /// Largest value within `half` samples on either side.

@@ -5,17 +5,21 @@
 //! all terms through one Gaussian. The measured normal force is known better than the torque, so the torque is the response.
 //! Rows where the elements are lifted off are left out.
 
-use super::balance::Balance;
+use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
-use super::filters::{gaussian, local_maximum, rms};
+use super::filters::{gaussian, largest_change, local_maximum, rms, white_share};
 use super::noise;
 use super::term::Parameter;
 use crate::files::rig_file::RigFile;
 
 /// Width of the filter, samples.
 pub const WIDTH: f64 = 4.0;
-/// Rows are taken every so many samples.
-const EVERY: usize = 2;
+/// What no model of the press is more accurate than, relative to its torque.
+const LEAST_NOISE: f64 = 5e-4;
+/// Share of the filtered change a sample that is not known.
+const BETWEEN_SAMPLES: f64 = 0.05;
+/// Share of the filtered second difference that the mode's two terms leave open: what the springs do between them.
+const BEND: f64 = 0.6;
 /// The elements touch where the normal force is more than this share of its usual size.
 const TOUCHING: f64 = 0.04;
 /// Gain and preload of the rig file are known within 10 %, the mode's coefficients within half.
@@ -130,45 +134,21 @@ pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balanc
             concat(&|log| gaussian(&log.torque_nm, WIDTH, 1).iter().map(|d| -d / log.step_s).collect()),
         ),
     ];
-    let (mut deviation, mut used, mut starts) = (Vec::new(), Vec::new(), Vec::new());
-    for log in logs {
-        let from = deviation.len();
-        starts.push(from);
-        let torque_change =
-            local_maximum(&gaussian(&log.torque_nm, WIDTH, 1).iter().map(|d| d.abs()).collect::<Vec<_>>(), 2);
-        let bend =
-            local_maximum(&gaussian(&log.normal_n, WIDTH, 2).iter().map(|d| d.abs()).collect::<Vec<_>>(), 4);
-        let narrow = (0.5 / (std::f64::consts::PI.sqrt() * WIDTH)).sqrt();
-        let white = narrow
-            * noise::standard_deviation(&log.torque_nm)
-                .hypot(noise::standard_deviation(&log.normal_n) / gain);
-        for i in 0..log.len() {
-            let n = [white, 5e-4 * log.torque_nm[i], 0.05 * torque_change[i], 0.6 * bend[i] / gain];
-            deviation.push(n.iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12));
-        }
-        let off: Vec<f64> = (0..log.len())
-            .map(|i| f64::from(u8::from(log.filtered_n[i] < TOUCHING * scales.load_n || !log.usable[i])))
-            .collect();
-        let near = local_maximum(&off, (3.0 * WIDTH) as usize);
-        let border = (4.0 * WIDTH) as usize;
-        used.extend(
-            (border..log.len().saturating_sub(border))
-                .step_by(EVERY)
-                .filter(|i| near[*i] == 0.0)
-                .map(|i| from + i),
-        );
-    }
-    let response = concat(&|log| log.filtered(&log.torque_nm));
-    let row_step_s = EVERY as f64 * logs.iter().map(|log| log.step_s).fold(f64::INFINITY, f64::min);
-    Balance {
-        response,
-        base,
-        first_deviation: deviation.clone(),
-        deviation,
-        used,
-        scale: scales.torque_nm,
-        temper: 3.0,
-        row_step_s,
-        starts,
-    }
+    let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, gain, scales)).collect();
+    Balance::new(concat(&|log| log.filtered(&log.torque_nm)), base, &rows, scales.torque_nm)
+}
+
+/// Rows of a log: noise from named sources; lifted off, the stop carries what the springs do not.
+fn rows<'l>(log: &'l PressLog, gain: f64, scales: &PressScales) -> LogRows<'l> {
+    let change = largest_change(&log.torque_nm, WIDTH);
+    let bend =
+        local_maximum(&gaussian(&log.normal_n, WIDTH, 2).iter().map(|d| d.abs()).collect::<Vec<_>>(), 4);
+    let white = white_share(WIDTH)
+        * noise::standard_deviation(&log.torque_nm).hypot(noise::standard_deviation(&log.normal_n) / gain);
+    let noise = move |i: usize| {
+        vec![white, LEAST_NOISE * log.torque_nm[i], BETWEEN_SAMPLES * change[i], BEND * bend[i] / gain]
+    };
+    let touching = TOUCHING * scales.load_n;
+    let left_out = log.filtered_n.iter().zip(&log.usable).map(|(n, used)| *n < touching || !used).collect();
+    LogRows { width: WIDTH, step_s: log.step_s, left_out, noise: Box::new(noise) }
 }

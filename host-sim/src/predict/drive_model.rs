@@ -9,6 +9,7 @@ use crate::files::log::{Log, LogKind};
 use crate::files::model_file::Extension;
 use crate::fit::drive::inverse::{Comparison, Motion, predict};
 use crate::fit::drive::record::{DriveRecord, FEWEST_SAMPLES};
+use crate::identify::effects::{DriveLaw, LIBRARY};
 use crate::identify::filters::shifted;
 use crate::input_error::InputError;
 
@@ -23,40 +24,13 @@ pub struct DrivePrediction {
     pub not_applied: Vec<String>,
 }
 
-/// An effort over position and speed.
-type Effort = Box<dyn Fn(f64) -> f64>;
-
-/// What an effect adds to the effort at a speed, and by how much it is late, s; `None` where it cannot be applied here.
-fn applied(extension: &Extension) -> Option<(Effort, f64)> {
+/// What an effect of a file makes of the drive; `None` where it cannot be applied here.
+fn applied(extension: &Extension) -> Option<DriveLaw> {
     // Names end in the unit of the drive.
-    let get = |start: &str| {
+    let value = |start: &str| {
         extension.parameters.iter().find(|(name, _)| name.starts_with(start)).map(|(_, value)| *value)
     };
-    let none: Effort = Box::new(|_| 0.0);
-    match extension.id.as_str() {
-        "drive_delay" => Some((none, get("delay_s")?)),
-        "torque_offset" => {
-            let offset = get("offset")?;
-            Some((Box::new(move |_| offset), 0.0))
-        }
-        "bearing_asymmetry" => {
-            let part =
-                |name: &str| get(&format!("{name}_difference")).or(get(&format!("{name}_half_difference")));
-            let (coulomb, viscous) = (part("coulomb"), part("viscous"));
-            coulomb.or(viscous)?;
-            let (coulomb, viscous) = (coulomb.unwrap_or(0.0), viscous.unwrap_or(0.0));
-            Some((Box::new(move |v| coulomb + viscous * v.abs()), 0.0))
-        }
-        "bearing_stribeck" => {
-            let (excess, speed) = (get("static_excess")?, get("stribeck_speed")?);
-            let exponent = get("exponent").unwrap_or(1.0);
-            Some((
-                Box::new(move |v: f64| excess * v.signum() * (-(v.abs() / speed).powf(exponent)).exp()),
-                0.0,
-            ))
-        }
-        _ => None,
-    }
+    LIBRARY.iter().find(|effect| effect.id() == extension.id)?.drive_law(&value)
 }
 
 /// A drive log as an even record.
@@ -94,9 +68,9 @@ pub fn predict_drive_log(model: &DriveModel, log: &Log) -> Result<DrivePredictio
     let (mut efforts, mut late_s, mut not_applied) = (Vec::new(), 0.0, Vec::new());
     for extension in &model.extensions {
         match applied(extension) {
-            Some((effort, late)) => {
-                efforts.push(effort);
-                late_s += late;
+            Some(law) => {
+                efforts.extend(law.effort);
+                late_s += law.late_s;
             }
             None => not_applied.push(extension.id.clone()),
         }

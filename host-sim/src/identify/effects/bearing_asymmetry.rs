@@ -1,6 +1,6 @@
 //! `bearing_asymmetry`: the bearing's Coulomb or viscous friction differs per direction.
 
-use super::{About, DriveView, Effect};
+use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
@@ -27,5 +27,13 @@ impl Effect for BearingAsymmetry {
             Parameter::amplitude("viscous_half_difference", s.own / s.speed),
         ];
         vec![Alternative::columns(self.id(), parameters, vec![coulomb, viscous])]
+    }
+
+    fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
+        let part = |name: &str| value(&format!("{name}_difference")).or(value(&format!("{name}_half_difference")));
+        let (coulomb, viscous) = (part("coulomb"), part("viscous"));
+        coulomb.or(viscous)?;
+        let (coulomb, viscous) = (coulomb.unwrap_or(0.0), viscous.unwrap_or(0.0));
+        Some(DriveLaw::effort(move |v| coulomb + viscous * v.abs()))
     }
 }

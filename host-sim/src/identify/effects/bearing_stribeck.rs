@@ -1,6 +1,6 @@
 //! `bearing_stribeck`: the bearing's friction falls with speed near zero.
 
-use super::{About, DriveView, Effect};
+use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
@@ -38,5 +38,11 @@ impl Effect for BearingStribeck {
         };
         let grid = SPEEDS.map(|share| share * s.speed).to_vec();
         super::shapes(view.fixed, "stribeck_speed", grid).into_iter().map(shape).collect()
+    }
+
+    fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
+        let (excess, speed) = (value("static_excess")?, value("stribeck_speed")?);
+        let exponent = value("exponent").unwrap_or(1.0);
+        Some(DriveLaw::effort(move |v| excess * v.signum() * (-(v.abs() / speed).powf(exponent)).exp()))
     }
 }

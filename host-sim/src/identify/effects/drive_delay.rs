@@ -1,6 +1,6 @@
 //! `drive_delay`: motion follows the commanded torque after a pure delay.
 
-use super::{About, DriveView, Effect};
+use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::filters::shifted;
 use crate::identify::term::Parameter;
@@ -39,5 +39,9 @@ impl Effect for DriveDelay {
         };
         let grid = (0..COUNT).map(|i| SHORTEST_S * RATIO.powi(i as i32)).collect();
         super::shapes(view.fixed, "delay_s", grid).into_iter().map(shape).collect()
+    }
+
+    fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
+        Some(DriveLaw { late_s: value("delay_s")?, ..DriveLaw::default() })
     }
 }

@@ -77,6 +77,22 @@ pub struct PressView<'a> {
     pub fixed: Option<&'a [(String, f64)]>,
 }
 
+/// What a fitted effect makes of a drive whose motion is known.
+#[derive(Default)]
+pub struct DriveLaw {
+    /// What it adds to the effort at a speed.
+    pub effort: Option<Box<dyn Fn(f64) -> f64>>,
+    /// By how much motion is late, s.
+    pub late_s: f64,
+}
+
+impl DriveLaw {
+    /// An effort over speed.
+    fn effort(of: impl Fn(f64) -> f64 + 'static) -> Self {
+        Self { effort: Some(Box::new(of)), late_s: 0.0 }
+    }
+}
+
 /// What an effect's file tells of it.
 #[derive(Debug, Clone, Copy)]
 pub struct About {
@@ -111,6 +127,12 @@ pub trait Effect: Sync {
     /// Its columns in the drive's balance, one entry for each shape.
     fn drive(&self, _view: &DriveView<'_>) -> Vec<Alternative> {
         Vec::new()
+    }
+
+    /// Its law for a drive log that is predicted; `value` finds a parameter of the model file by the start of its name,
+    /// which ends in the drive's unit. `None` where it needs a second mass, or an origin that every log has for itself.
+    fn drive_law(&self, _value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
+        None
     }
 
     /// Its columns in the press's balance, one entry for each shape.

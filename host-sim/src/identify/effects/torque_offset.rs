@@ -1,6 +1,6 @@
 //! `torque_offset`: the commanded torque has a constant offset.
 
-use super::{About, DriveView, Effect};
+use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
 
@@ -19,5 +19,10 @@ impl Effect for TorqueOffset {
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let ones = vec![1.0; view.balance.response.len()];
         vec![Alternative::columns(self.id(), vec![Parameter::amplitude("offset", view.scales.own)], vec![ones])]
+    }
+
+    fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
+        let offset = value("offset")?;
+        Some(DriveLaw::effort(move |_| offset))
     }
 }
