@@ -10,18 +10,18 @@ static INSTALL: Once = Once::new();
 pub(super) const BY_USER: &str = "stopped by the user (Ctrl-C, or the process was told to end)";
 
 /// From now on signals are counted instead of ending the process.
-pub(super) fn count_signals() {
+pub fn count_signals() {
     INSTALL.call_once(|| {
         let counted = ctrlc::set_handler(|| {
             COUNT.fetch_add(1, Ordering::Relaxed);
         });
         if let Err(error) = counted {
-            eprintln!("rig: Ctrl-C will end the program at once: {error}");
+            eprintln!("Ctrl-C will end the program at once: {error}");
         }
     });
 }
 
 /// How many have come.
-pub(super) fn count() -> usize {
+pub fn count() -> usize {
     COUNT.load(Ordering::Relaxed)
 }

@@ -10,7 +10,7 @@ mod demo;
 mod design;
 mod diagnose;
 mod fit;
-mod interrupt;
+pub mod interrupt;
 mod keeper;
 mod monitor;
 mod port;

@@ -21,6 +21,8 @@ pub struct Progress {
     what: String,
     total: u64,
     done: u64,
+    /// Done before this process began.
+    before: u64,
     started: Instant,
     shown: Option<Instant>,
     terminal: bool,
@@ -34,6 +36,7 @@ impl Progress {
             what: what.into(),
             total,
             done: 0,
+            before: 0,
             started: Instant::now(),
             shown: None,
             terminal: std::io::stderr().is_terminal(),
@@ -56,6 +59,12 @@ impl Progress {
         }
     }
 
+    /// So many steps were done by an earlier process: what is left is estimated from those of this one.
+    pub fn goes_on_from(&mut self, done: u64) {
+        self.before = done;
+        self.done = done;
+    }
+
     /// The number of all steps, where it was not known at the start.
     pub fn of(&mut self, total: u64) {
         self.total = total;
@@ -72,18 +81,31 @@ impl Progress {
         self.advance(0);
     }
 
+    /// Seconds until all is done at this pace; none before the first step.
+    fn left_s(&self, elapsed_s: f64) -> Option<f64> {
+        let steps = self.done.checked_sub(self.before).filter(|steps| *steps > 0)?;
+        Some(elapsed_s / steps as f64 * self.total.saturating_sub(self.done) as f64)
+    }
+
     fn show(&mut self) {
         if !self.terminal {
             let percent = 100 * self.done / self.total.max(1);
-            eprintln!("{}: {percent} % after {:.0} s", self.what, self.started.elapsed().as_secs_f64());
+            let elapsed = self.started.elapsed().as_secs_f64();
+            let left = match self.left_s(elapsed) {
+                Some(left) => format!(", some {left:.0} s left"),
+                None => String::new(),
+            };
+            eprintln!("{}: {percent} % after {elapsed:.0} s{left}", self.what);
             return;
         }
-        let total = self.total;
+        let (total, before) = (self.total, self.before);
         let bar = self.bar.get_or_insert_with(|| {
             let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
             if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} % {eta}") {
                 bar.set_style(style);
             }
+            bar.set_position(before);
+            bar.reset_eta();
             bar
         });
         bar.set_message(self.what.clone());
@@ -96,5 +118,22 @@ impl Drop for Progress {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_counts_from_the_steps_of_this_process() {
+        let mut progress = Progress::new("x", 100);
+        assert_eq!(progress.left_s(3.0), None);
+        progress.set(25);
+        assert_eq!(progress.left_s(5.0), Some(15.0));
+        progress.goes_on_from(80);
+        assert_eq!(progress.left_s(1.0), None);
+        progress.set(90);
+        assert_eq!(progress.left_s(5.0), Some(5.0));
     }
 }

@@ -4,20 +4,28 @@
 //! translate the firmware anew each time, which costs more than what a short branch runs. A process that is forked
 //! shares all memory with the one it came from until it writes to it, so a branch begins within a millisecond.
 //!
-//! The thread that forks is the emulator's own. In the branch it is the only thread: the operator of before is not there,
+//! The trunk's operator asks for one result after the other, and works on it while no branch begins: so it holds nothing
+//! that a branch would find locked. The thread that forks is the emulator's own. In the branch it is the only thread: the operator of before is not there,
 //! and a new one begins. The branch never returns to the code around the run; it ends when its operator is done.
 
 use crate::endpoint::{BenchEnd, Endpoint, endpoint_at};
+use crate::error::BenchError;
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::io::Errno;
 use std::collections::VecDeque;
 use std::io::{self, PipeReader, PipeWriter, Read, Write};
+use std::ops::ControlFlow;
 
 /// What an operator does in a branch; what it returns is carried to the trunk.
 pub type Job = Box<dyn FnOnce(&mut Endpoint) -> Vec<u8> + Send>;
 
+/// Takes the number of a job and what its branch gave; says whether further ones may begin.
+pub type Each<'a> = dyn FnMut(usize, &[u8]) -> Result<ControlFlow<()>, BenchError> + 'a;
+
 /// Where this process goes on.
 pub(crate) enum Side {
-    /// In the run that was there before, with what the branches gave, in the order of the jobs.
-    Trunk(Vec<Vec<u8>>),
+    /// In the run that was there before, with the number of a job and what its branch gave; none when all are done.
+    Trunk(Option<(usize, Vec<u8>)>),
     /// In a branch.
     Branch(Begin),
 }
@@ -45,47 +53,73 @@ impl Begin {
 
 /// A branch under way.
 struct Running {
+    nth: usize,
     process: libc::pid_t,
     reader: PipeReader,
 }
 
 impl Running {
     /// Waits for its end.
-    fn result(mut self) -> io::Result<Vec<u8>> {
+    fn result(mut self) -> io::Result<(usize, Vec<u8>)> {
         let mut result = Vec::new();
         self.reader.read_to_end(&mut result)?;
         let mut status = 0;
         // SAFETY: `status` is a place for the answer, and the process is a child of this one that nobody else waits for.
         let ended = unsafe { libc::waitpid(self.process, &raw mut status, 0) };
         if ended == self.process && status == 0 {
-            Ok(result)
+            Ok((self.nth, result))
         } else {
             Err(io::Error::other(format!("a branch of the run ended with status {status}")))
         }
     }
 }
 
-/// Forks once for each job, with at most `at_once` of them under way.
-pub(crate) fn split(jobs: Vec<Job>, at_once: usize) -> io::Result<Side> {
-    let mut running: VecDeque<Running> = VecDeque::new();
-    let mut results = Vec::new();
-    for job in jobs {
-        if running.len() >= at_once.max(1)
-            && let Some(first) = running.pop_front()
+/// Jobs that wait for their branch, and branches under way.
+#[derive(Default)]
+pub(crate) struct Branches {
+    waiting: VecDeque<(usize, Job)>,
+    running: Vec<Running>,
+    at_once: usize,
+}
+
+impl Branches {
+    /// None of these jobs has begun yet; at most `at_once` of them will be under way.
+    pub(crate) fn new(jobs: Vec<Job>, at_once: usize) -> Self {
+        Self { waiting: jobs.into_iter().enumerate().collect(), running: Vec::new(), at_once: at_once.max(1) }
+    }
+
+    /// Those that have not begun never will.
+    pub(crate) fn begin_no_more(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Begins as many as may be under way, and waits for the first of them that ends: a short one must not wait for a
+    /// long one that began before it.
+    pub(crate) fn next(&mut self) -> io::Result<Side> {
+        while self.running.len() < self.at_once
+            && let Some((nth, job)) = self.waiting.pop_front()
         {
-            results.push(first.result()?);
+            let (reader, out) = io::pipe()?;
+            // SAFETY: the branch goes on in the code of this thread alone, whose other threads wait in channels and hold no
+            // lock it takes: the allocator and the standard streams put their own in order over a fork.
+            match unsafe { libc::fork() } {
+                -1 => return Err(io::Error::last_os_error()),
+                0 => return Ok(Side::Branch(Begin { job, out })),
+                process => self.running.push(Running { nth, process, reader }),
+            }
         }
-        let (reader, out) = io::pipe()?;
-        // SAFETY: the branch goes on in the code of this thread alone, whose other threads wait in channels and hold no lock
-        // it takes: the allocator and the standard streams put their own in order over a fork.
-        match unsafe { libc::fork() } {
-            -1 => return Err(io::Error::last_os_error()),
-            0 => return Ok(Side::Branch(Begin { job, out })),
-            process => running.push_back(Running { process, reader }),
+        if self.running.is_empty() {
+            return Ok(Side::Trunk(None));
         }
+        let mut readers: Vec<PollFd<'_>> =
+            self.running.iter().map(|running| PollFd::new(&running.reader, PollFlags::IN)).collect();
+        // A signal that is counted elsewhere wakes too.
+        while let Err(error) = poll(&mut readers, None) {
+            if error != Errno::INTR {
+                return Err(error.into());
+            }
+        }
+        let ended = readers.iter().position(|reader| !reader.revents().is_empty()).unwrap_or_default();
+        self.running.swap_remove(ended).result().map(|result| Side::Trunk(Some(result)))
     }
-    for rest in running {
-        results.push(rest.result()?);
-    }
-    Ok(Side::Trunk(results))
 }

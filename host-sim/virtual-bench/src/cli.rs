@@ -1,7 +1,8 @@
 //! The command line of `cargo virtual-bench`.
 
 use crate::budget::{Budget, Cost};
-use crate::campaign::{self, Plan};
+use crate::campaign::kept::{Campaign, Kept};
+use crate::campaign::{self, Plan, Run};
 use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{self, Done, ObserverResidual, Request};
@@ -12,6 +13,7 @@ use crate::serve::{self, Served};
 use crate::soak;
 use clap::{ArgGroup, Parser};
 use host_sim::cli::common::{SetArgs, say, wrong_argument};
+use host_sim::cli::interrupt;
 use host_sim::cli::progress::Progress;
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::files::model_file::ModelFile;
@@ -20,7 +22,9 @@ use host_sim::files::rig_file::RigFile;
 use host_sim::input_error::InputError;
 use host_sim::summary::{RunFacts, Summary, summarise};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -45,6 +49,9 @@ Examples:
 An experiment writes log.csv (as the host tool recorded it from the serial link), capture.csv (two seconds at the full
 10 kHz around the step, read from the firmware's memory afterwards), summary.json (figures at the full rate where the
 capture has it; what the observer's model left unexplained) and defmt.log (the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
+
+--faults writes each run to faults.jsonl in --out as soon as it is done, and all of them to faults.json at the end. Ctrl-C
+ends it with the table so far; the same command with the same --out then makes the runs that are left.
 
 --serve makes a board of it: the ELF runs in real time, prints the name of its serial port and then its log, and every
 command of rig works on that port as on a board's. The keyboard is what a person would touch at the rig; ? shows the
@@ -215,24 +222,43 @@ fn run_faults(cli: &Cli, firmware: &Firmware) -> Result<(), BenchError> {
         only: cli.only.clone(),
         ..Plan::whole()
     };
+    let total = plan.runs();
+    let (mut stored, known) = match &cli.out {
+        Some(out) => Stored::open(out, &Campaign::new(&plan, firmware)?, cli.force)
+            .map(|(stored, known)| (Some(stored), known))?,
+        None => (None, BTreeMap::new()),
+    };
+    let mut done = known.len();
+    if done > 0 {
+        eprintln!("virtual-bench: {done} of {total} runs are there already");
+    }
+    interrupt::count_signals();
     let started = Instant::now();
-    let mut progress: Option<Progress> = None;
-    let mut done = 0;
-    let runs = campaign::run(firmware, &plan, &mut |new, total| {
-        done += new.len();
-        progress.get_or_insert_with(|| Progress::new("faults", total as u64)).set(done as u64);
-        for run in campaign::table::failed(new) {
-            eprintln!("{}, {}: {}", run.fault, run.state.name(), run.row.problems.join("; "));
+    let mut progress = Progress::new("faults", total as u64);
+    progress.goes_on_from(done as u64);
+    let runs = campaign::run(firmware, &plan, known, &mut |new| {
+        if let Some(stored) = &mut stored {
+            stored.kept.add(&new)?;
         }
+        done += 1;
+        progress.set(done as u64);
+        if campaign::table::has_failed(new.run) {
+            let Run { fault, state, at_ns, row } = new.run;
+            eprintln!("{fault}, {}, at {at_ns} ns: {}", state.name(), row.problems.join("; "));
+        }
+        Ok(if interrupt::count() > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
     drop(progress);
     say(&campaign::table::table(&runs));
     say(&format!("{:.0} s", started.elapsed().as_secs_f64()));
-    if let Some(out) = &cli.out {
-        if cli.force {
-            output_dir::allow_overwriting();
-        }
-        let mut output = OutputDir::new(out)?;
+    if runs.len() < total {
+        let next = match &cli.out {
+            Some(_) => "the same command goes on from there",
+            None => "with --out the same command would go on from there",
+        };
+        return Err(BenchError::Stopped(format!("{} of {total} runs are done; {next}", runs.len())));
+    }
+    if let Some(Stored { mut output, .. }) = stored {
         output.write_json("faults.json", &runs)?;
         output.finish()?;
     }
@@ -241,6 +267,23 @@ fn run_faults(cli: &Cli, firmware: &Firmware) -> Result<(), BenchError> {
         Ok(())
     } else {
         Err(BenchError::Check(format!("{failed} of {} runs", campaign::table::counted(&runs))))
+    }
+}
+
+/// Where a campaign's runs go: each at once, and at the end all of them.
+struct Stored {
+    kept: Kept,
+    output: OutputDir,
+}
+
+impl Stored {
+    fn open(out: &Path, campaign: &Campaign, anew: bool) -> Result<(Self, BTreeMap<usize, Run>), InputError> {
+        let is_begun = out.join(campaign::kept::NAME).exists();
+        let mut output = if anew || is_begun { OutputDir::replacing(out)? } else { OutputDir::new(out)? };
+        // Refused now and not at the end, if it is of a campaign whose runs are not there.
+        output.write("faults.json", "")?;
+        let (kept, known) = Kept::open(out, campaign, anew)?;
+        Ok((Self { kept, output }, known))
     }
 }
 

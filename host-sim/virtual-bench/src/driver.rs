@@ -6,7 +6,7 @@
 //! over the period. So what a tick computes from the samples of one period acts from the start of the next: one
 //! control period of delay, as in the PC rig.
 
-use crate::branch::{self, Side};
+use crate::branch::{Branches, Side};
 use crate::elf::Firmware;
 use crate::endpoint::{BenchEnd, Question, ToBench, ToEndpoint};
 use crate::interference::Obstacle;
@@ -105,6 +105,7 @@ pub(crate) struct BenchDriver {
     /// In the last period a drive got another reference than the chip gave.
     wrong_reference: bool,
     next: u64,
+    branches: Branches,
     record: Record,
 }
 
@@ -150,6 +151,7 @@ impl BenchDriver {
             open: [false; 5],
             wrong_reference: false,
             next: PERIOD,
+            branches: Branches::default(),
             record: Record::default(),
         }
     }
@@ -437,20 +439,22 @@ impl BenchDriver {
                 }
                 ToBench::Send(bytes) => serial::send(&mut session.board_mut().part, &bytes),
                 ToBench::Act(action) => self.act(action, session, stop, host),
-                ToBench::Branch { jobs, at_once } => {
-                    let branched = branch::split(jobs, at_once);
-                    let sent = match branched {
-                        Ok(Side::Trunk(results)) => {
-                            self.end.to_endpoint.send(ToEndpoint::Branched(Ok(results)))
-                        }
+                ToBench::Branch { jobs, at_once } => self.branches = Branches::new(jobs, at_once),
+                ToBench::NextBranch { begin_more } => {
+                    if !begin_more {
+                        self.branches.begin_no_more();
+                    }
+                    let result = match self.branches.next() {
+                        Ok(Side::Trunk(result)) => Ok(result),
                         Ok(Side::Branch(job)) => {
-                            // In a process of its own, with an operator of its own.
+                            // In a process of its own, with an operator of its own; the other branches are the trunk's.
+                            self.branches = Branches::default();
                             self.end = job.begin(stop.at.0);
                             continue;
                         }
-                        Err(error) => self.end.to_endpoint.send(ToEndpoint::Branched(Err(error.to_string()))),
+                        Err(error) => Err(error.to_string()),
                     };
-                    if sent.is_err() {
+                    if self.end.to_endpoint.send(ToEndpoint::Branched(result)).is_err() {
                         return false;
                     }
                 }

@@ -5,7 +5,7 @@
 //! only when the operator waits for more, or for an instant. So the operator's wall-clock speed does not
 //! matter, and two runs are the same run.
 
-use crate::branch::Job;
+use crate::branch::{Each, Job};
 use crate::error::BenchError;
 use crate::meter::Ticks;
 use crate::outside::{Action, DriveInputs, Motion};
@@ -20,10 +20,14 @@ pub(crate) enum ToBench {
     Ask(Question),
     /// Wake me when bytes come, or at this instant.
     Wait(u64),
-    /// Go on from here as often as there are jobs, each in a process of its own.
+    /// Go on from here as often as there are jobs, each in a process of its own, when results are asked for.
     Branch {
         jobs: Vec<Job>,
         at_once: usize,
+    },
+    /// Wait for the next branch that ends; with `begin_more` those that still wait may begin meanwhile.
+    NextBranch {
+        begin_more: bool,
     },
 }
 
@@ -57,7 +61,7 @@ pub(crate) enum ToEndpoint {
     Seen(Option<Seen>),
     Record(Box<Record>),
     Motion(Motion),
-    Branched(Result<Vec<Vec<u8>>, String>),
+    Branched(Result<Option<(usize, Vec<u8>)>, String>),
     Done(Result<(), String>),
 }
 
@@ -241,16 +245,25 @@ impl Endpoint {
         }
     }
 
-    /// Goes on from here once for each job, `at_once` of them at a time, and gives what each returned. A job works at an
-    /// endpoint of its own, in a process of its own, so that it costs what it runs and no start; this run does not notice.
+    /// Goes on from here once for each job, `at_once` of them at a time. `each` gets the number of a job and what it
+    /// returned as soon as that is known, and says whether further ones may begin. A job works at an endpoint of its own, in a
+    /// process of its own, so that it costs what it runs and no start; this run does not notice.
     ///
     /// # Errors
-    /// The run ended, or the system has no more processes to give.
-    pub fn branch(&mut self, jobs: Vec<Job>, at_once: usize) -> Result<Vec<Vec<u8>>, BenchError> {
+    /// The run ended, the system has no more processes to give, or `each` failed.
+    pub fn branch(&mut self, jobs: Vec<Job>, at_once: usize, each: &mut Each<'_>) -> Result<(), BenchError> {
         self.to_bench.send(ToBench::Branch { jobs, at_once }).map_err(|_| over())?;
-        match self.from_bench.recv().map_err(|_| over())? {
-            ToEndpoint::Branched(results) => results.map_err(BenchError::Emulator),
-            _ => Err(over()),
+        let mut begin_more = true;
+        loop {
+            self.to_bench.send(ToBench::NextBranch { begin_more }).map_err(|_| over())?;
+            match self.from_bench.recv().map_err(|_| over())? {
+                ToEndpoint::Branched(Ok(Some((nth, result)))) => {
+                    begin_more &= each(nth, &result)?.is_continue();
+                }
+                ToEndpoint::Branched(Ok(None)) => return Ok(()),
+                ToEndpoint::Branched(Err(error)) => return Err(BenchError::Emulator(error)),
+                _ => return Err(over()),
+            }
         }
     }
 

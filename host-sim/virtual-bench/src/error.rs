@@ -19,6 +19,8 @@ pub enum BenchError {
     Rig(String),
     /// A check failed.
     Check(String),
+    /// The user ended it.
+    Stopped(String),
 }
 
 impl std::fmt::Display for BenchError {
@@ -34,6 +36,7 @@ impl std::fmt::Display for BenchError {
             Self::Port(why) => write!(f, "the port: {why}"),
             Self::Rig(why) => write!(f, "the rig: {why}"),
             Self::Check(why) => write!(f, "check failed: {why}"),
+            Self::Stopped(where_it_stands) => write!(f, "stopped by the user: {where_it_stands}"),
         }
     }
 }

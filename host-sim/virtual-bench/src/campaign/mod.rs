@@ -7,6 +7,7 @@
 
 pub mod case;
 pub mod faults;
+pub mod kept;
 mod link_noise;
 pub mod listening_host;
 mod settings_cut;
@@ -28,6 +29,8 @@ use faults::FaultCase;
 use listening_host::ListeningHost;
 use serde::{Deserialize, Serialize};
 use states::State;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -35,7 +38,7 @@ use std::sync::Arc;
 pub const PROMISED_NS: u64 = 2 * PERIOD;
 
 /// What is run.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Instants in each state.
     pub instants: usize,
@@ -74,6 +77,32 @@ impl Plan {
         Self { instants: 1, seed, in_turn: true, ..Self::whole() }
     }
 
+    /// The faults, in the order of their places.
+    fn faults(&self) -> Vec<FaultCase> {
+        let wanted =
+            |case: &FaultCase| self.only.as_ref().is_none_or(|only| case.name.contains(only.as_str()));
+        faults::all().into_iter().filter(wanted).collect()
+    }
+
+    /// Runs of a fault at each instant.
+    const fn times(&self, case: &FaultCase) -> usize {
+        if case.is_flip { self.flips } else { 1 }
+    }
+
+    /// Runs at each instant of the state with this place in the plan.
+    fn runs_an_instant(&self, faults: &[FaultCase], place: usize) -> usize {
+        let here = faults.iter().enumerate().filter(|(fault, _)| self.takes(*fault, place));
+        here.map(|(_, case)| self.times(case)).sum()
+    }
+
+    /// All runs.
+    #[must_use]
+    pub fn runs(&self) -> usize {
+        let faults = self.faults();
+        let each = (0..self.states.len()).map(|place| self.runs_an_instant(&faults, place));
+        self.instants * each.sum::<usize>()
+    }
+
     /// Whether the fault with this place in the list is made in the state with that place in the plan.
     #[must_use]
     pub fn takes(&self, fault: usize, state: usize) -> bool {
@@ -100,33 +129,45 @@ pub struct Run {
     pub row: Row,
 }
 
-/// Runs the campaign; `tell` hears the runs as they are done, and how many there will be.
+/// A run that is done, and its place among all of the campaign.
+#[derive(Debug)]
+pub struct Done<'a> {
+    /// Its number: the same plan gives the same run the same number.
+    pub nth: usize,
+    /// What became of it.
+    pub run: &'a Run,
+}
+
+/// Hears of a run as soon as it is done, and says whether further ones are to begin.
+pub type Tell<'a> = dyn FnMut(Done<'_>) -> Result<ControlFlow<()>, BenchError> + Send + 'a;
+
+/// Runs the campaign, but for the runs that are `known`, by their number. `tell` hears of each
+/// other one. Gives all runs, the known ones too, in the order of their numbers.
 ///
 /// # Errors
-/// The bench itself failed. A firmware that fails a fault is no error: see [`Row::problems`].
+/// The bench itself failed, or `tell` did. A firmware that fails a fault is no error: see [`Row::problems`].
 pub fn run(
     firmware: &Firmware,
     plan: &Plan,
-    tell: &mut (dyn FnMut(&[Run], usize) + Send),
+    known: BTreeMap<usize, Run>,
+    tell: &mut Tell<'_>,
 ) -> Result<Vec<Run>, BenchError> {
-    let wanted = |case: &FaultCase| plan.only.as_ref().is_none_or(|only| case.name.contains(only.as_str()));
-    let faults: Arc<Vec<FaultCase>> = Arc::new(faults::all().into_iter().filter(wanted).collect());
-    let table = Arc::new(defmt_log::table(&firmware.bytes)?);
-    let chip = Chip { faults: Arc::clone(&faults), table, control_state: firmware.control_state };
-    let times = |case: &FaultCase| if case.is_flip { plan.flips } else { 1 };
-    let total = plan.instants
-        * (0..plan.states.len())
-            .flat_map(|place| faults.iter().enumerate().filter(move |(nth, _)| plan.takes(*nth, place)))
-            .map(|(_, case)| times(case))
-            .sum::<usize>();
-    let mut runs = Vec::new();
+    let chip = Chip {
+        faults: Arc::new(plan.faults()),
+        table: Arc::new(defmt_log::table(&firmware.bytes)?),
+        control_state: firmware.control_state,
+    };
+    let mut runs = Runs { done: known, first: 0, tell, ended: false };
     for (place, state) in plan.states.iter().enumerate() {
-        let outcome = bench::run(firmware, Box::new(state.plant()?), |endpoint| {
-            in_state(endpoint, place, plan, &chip, &mut |new| tell(new, total))
-        })?;
-        runs.extend(outcome.operator);
+        let each = plan.runs_an_instant(&chip.faults, place);
+        let last = runs.first + each * plan.instants;
+        if !runs.ended && (runs.first..last).any(|nth| !runs.done.contains_key(&nth)) {
+            let plant = Box::new(state.plant()?);
+            bench::run(firmware, plant, |endpoint| in_state(endpoint, place, plan, &chip, &mut runs))?;
+        }
+        runs.first = last;
     }
-    Ok(runs)
+    Ok(runs.done.into_values().collect())
 }
 
 /// What the branches share.
@@ -136,13 +177,28 @@ struct Chip {
     control_state: (u64, u64),
 }
 
+/// The runs so far.
+struct Runs<'a, 'b> {
+    done: BTreeMap<usize, Run>,
+    /// Number of the first run of the state at hand.
+    first: usize,
+    tell: &'a mut Tell<'b>,
+    ended: bool,
+}
+
+/// A run that is to be made.
+struct ToDo {
+    nth: usize,
+    case: FaultCase,
+}
+
 fn in_state(
     endpoint: &mut Endpoint,
     place: usize,
     plan: &Plan,
     chip: &Chip,
-    tell: &mut dyn FnMut(&[Run]),
-) -> Result<Vec<Run>, BenchError> {
+    runs: &mut Runs<'_, '_>,
+) -> Result<(), BenchError> {
     let state = plan.states[place];
     state.reach(endpoint)?;
     let mut listener = ListeningHost::new();
@@ -152,45 +208,74 @@ fn in_state(
     let mut instants: Vec<u64> =
         (0..plan.instants).map(|_| begin + chance.below(DRAWN_FROM_PERIODS) * PERIOD).collect();
     instants.sort_unstable();
-    let mut runs = Vec::new();
+    let mut nth = runs.first;
     for instant in instants {
         listener.listen(endpoint, instant)?;
-        let at_ns = endpoint.now_ns();
-        let twin = match endpoint
-            .branch(vec![Box::new(|endpoint: &mut Endpoint| encoded(&case::twin(endpoint)))], 1)?
-            .first()
-        {
-            Some(bytes) => decoded(bytes)?,
-            None => None,
-        };
-        let mut names = Vec::new();
-        let mut jobs: Vec<Job> = Vec::new();
-        for (_, case) in chip.faults.iter().enumerate().filter(|(nth, _)| plan.takes(*nth, place)) {
-            for _ in 0..if case.is_flip { plan.flips } else { 1 } {
+        let mut to_do = Vec::new();
+        for (_, case) in chip.faults.iter().enumerate().filter(|(fault, _)| plan.takes(*fault, place)) {
+            for _ in 0..plan.times(case) {
                 let mut case = case.clone();
+                // Drawn for those that are known too: the numbers after them stay the same.
                 if case.is_flip {
                     let (start, length) = chip.control_state;
                     let (offset, bit) = (chance.below(length), chance.below(8));
                     case.actions = vec![Action::FlipBit { address: start + offset, bit: bit as u8 }];
                 }
-                names.push(case.name.clone());
-                let table = Arc::clone(&chip.table);
-                jobs.push(Box::new(move |endpoint: &mut Endpoint| {
-                    let mut row = case::run(endpoint, &case, state, &Common { table: &table, twin });
-                    if case.is_flip && !row.problems.is_empty() {
-                        row.problems.push(format!("{:?}", case.actions));
-                    }
-                    encoded(&row)
-                }));
+                if !runs.done.contains_key(&nth) {
+                    to_do.push(ToDo { nth, case });
+                }
+                nth += 1;
             }
         }
-        let done = runs.len();
-        for (bytes, fault) in endpoint.branch(jobs, plan.at_once)?.iter().zip(names) {
-            runs.push(Run { fault, state, at_ns, row: decoded(bytes)? });
+        at_an_instant(endpoint, state, plan, chip, to_do, runs)?;
+        if runs.ended {
+            break;
         }
-        tell(&runs[done..]);
     }
-    Ok(runs)
+    Ok(())
+}
+
+/// Branches once for each run.
+fn at_an_instant(
+    endpoint: &mut Endpoint,
+    state: State,
+    plan: &Plan,
+    chip: &Chip,
+    mut to_do: Vec<ToDo>,
+    runs: &mut Runs<'_, '_>,
+) -> Result<(), BenchError> {
+    let at_ns = endpoint.now_ns();
+    let mut twin = None;
+    if to_do.iter().any(|run| run.case.is_flip) {
+        let job: Job = Box::new(|endpoint: &mut Endpoint| encoded(&case::twin(endpoint)));
+        endpoint.branch(vec![job], 1, &mut |_, bytes| {
+            twin = decoded(bytes)?;
+            Ok(ControlFlow::Continue(()))
+        })?;
+    }
+    // The longest first: else the last of them runs while the other cores have nothing to do.
+    to_do.sort_by_key(|run| std::cmp::Reverse(faults::watch_ns(&run.case, state)));
+    let jobs = to_do.iter().map(|run| job(run.case.clone(), state, &chip.table, twin)).collect();
+    endpoint.branch(jobs, plan.at_once, &mut |which, bytes| {
+        let Some(ToDo { nth, case }) = to_do.get(which) else { return Ok(ControlFlow::Continue(())) };
+        let run = Run { fault: case.name.clone(), state, at_ns, row: decoded(bytes)? };
+        let told = (runs.tell)(Done { nth: *nth, run: &run })?;
+        runs.done.insert(*nth, run);
+        runs.ended |= told.is_break();
+        Ok(told)
+    })
+}
+
+/// What a branch does for a run.
+fn job(case: FaultCase, state: State, table: &Arc<Table>, twin: Option<(u64, u64)>) -> Job {
+    let table = Arc::clone(table);
+    Box::new(move |endpoint: &mut Endpoint| {
+        let mut row = case::run(endpoint, &case, state, &Common { table: &table, twin });
+        if case.is_flip && !row.problems.is_empty() {
+            row.problems.push(format!("{:?}", case.actions));
+        }
+        encoded(&row)
+    })
 }
 
 fn encoded<T: Serialize>(value: &T) -> Vec<u8> {

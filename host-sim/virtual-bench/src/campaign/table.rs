@@ -37,10 +37,16 @@ pub fn counted(runs: &[Run]) -> usize {
     runs.iter().filter(|run| run.row.seen.is_some()).count()
 }
 
+/// Whether the run counts and something in it was not as it must be.
+#[must_use]
+pub fn has_failed(run: &Run) -> bool {
+    run.row.seen.is_some() && !run.row.problems.is_empty()
+}
+
 /// Runs that count and in which something was not as it must be.
 #[must_use]
 pub fn failed(runs: &[Run]) -> Vec<&Run> {
-    runs.iter().filter(|run| run.row.seen.is_some() && !run.row.problems.is_empty()).collect()
+    runs.iter().filter(|run| has_failed(run)).collect()
 }
 
 /// How often each text came, the most frequent first.
