@@ -5,15 +5,15 @@
 //! | flash bank 1 | program | the settings are in bank 2, so erasing them does not stall fetches |
 //! | flash bank 2, sectors 0 and 1 | settings | two sectors: one is erased while the other is valid |
 //! | flash bank 2, sector 2 | journal of their erasing | a sector half erased at a power cut is known as such |
+//! | ITCM | vectors, the control tick and what it calls | no wait states, whatever ran before (`itcm.rs`) |
 //! | DTCM, first 56 KB | stack | at its lower end memory ends: an overflow traps instead of overwriting |
 //! | DTCM, the rest | `.data`, `.bss`: state of the loop | no wait states, no cache: the tick's time is steady |
 //! | AXI SRAM, 480 KB | rows of the capture | largest memory; written by the tick, read by the link |
 //! | AXI SRAM, 32 KB | DMA buffers | DMA1 and DMA2 do not reach the DTCM |
 //! | SRAM4 | crash record, kept over a reset | nothing clears it at reset or start |
 //!
-//! **Caches.** The instruction cache is on: at 480 MHz flash answers after several wait states. The data
-//! cache stays off: state and stack are in DTCM, which needs none, and so no DMA buffer can be stale.
-//! Whoever turns it on must first make the region `DMA` non-cacheable.
+//! **Caches.** The instruction cache is on: at 480 MHz flash answers after several wait states. The data cache is on for flash
+//! bank 1 alone: state and stack are in DTCM, which needs none, and memory that a DMA writes is not cached (`mpu.rs`).
 //!
 //! **Uninitialised regions.** `.capture`, `.dma` and `.crash` are not written at start. What lies there is
 //! either made of atomics, for which any bits are a value, or cleared here before it is given away.

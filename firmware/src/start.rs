@@ -1,11 +1,11 @@
 //! The start that every program for this board shares: safe first, then clock, pins, outputs, core.
 //!
-//! The order matters: drive enables are driven low before anything else is set up, and the DAC starts at zero torque.
+//! The order matters: the memory map traps what goes wrong from then on, and drive enables are driven low before anything else is set up, and the DAC starts at zero torque.
 //! Nothing here enables a drive. The firmware and the tests on the board begin with the same call, so that what is
 //! tested is what is flashed.
 
 use crate::board::{self, Board};
-use crate::{clocks, crash_record, outputs, restart};
+use crate::{clocks, crash_record, itcm, mpu, outputs, restart};
 use rig_link::message::{CrashRecord, ResetCause};
 
 /// What the start found.
@@ -23,13 +23,13 @@ pub struct Started {
 /// Starts the board. To be called once, before anything else.
 #[must_use]
 pub fn start() -> Started {
+    prepare_core();
     let reset = restart::reset_cause();
     let crash_record = crash_record::take();
     let crystal = clocks::crystal_present();
     let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
     outputs::start();
     clocks::yield_to_the_tick();
-    enable_core_features();
     if crystal {
         clocks::watch_crystal();
     } else {
@@ -38,10 +38,12 @@ pub fn start() -> Started {
     Started { reset, crash_record, crystal, board }
 }
 
-/// Instruction cache and cycle counter; the data cache stays off (`memory.rs`).
-fn enable_core_features() {
+/// Vectors, memory map, caches, cycle counter: first, as they trap what goes wrong from here on.
+fn prepare_core() {
     // SAFETY: nothing else uses the core peripherals; this runs once, before any interrupt of ours.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
+    itcm::use_vectors(&mut core.SCB);
+    mpu::start(&mut core.MPU, &mut core.SCB, &mut core.CPUID);
     core.SCB.enable_icache();
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();

@@ -18,7 +18,7 @@ use crate::part::encoder_timer::{Disturbance, Edge};
 use crate::record::{Record, Saved};
 use crate::rtt::Rtt;
 use crate::sighting::{Deviations, Lookout};
-use crate::{board::RigBoard, interference, pins, serial};
+use crate::{board::RigBoard, interference, pins, probe, serial};
 use rigless::device::ResetCause;
 use rigless::emulator::{AccessKind, Driver, HitKind, Host, Settled, Stop, Watch};
 use rigless::mcu::Mcu;
@@ -296,8 +296,8 @@ impl BenchDriver {
                 interference::lock_up_serial_streams(part, stop.at);
             }
             Action::MaskInterrupts { times, from_ns, for_ns } => {
-                let stub =
-                    interference::masking_stub(host, self.addresses.low_handler, times, from_ns, for_ns);
+                let stub = interference::masking_stub(host, self.addresses.low_handler, from_ns, for_ns);
+                interference::mask_times(part, stop.at, times);
                 self.program(interference::vector(LOW_LINE), Width::W32, stub, host);
                 self.watch(interference::MASKED_AT, host);
             }
@@ -316,7 +316,25 @@ impl BenchDriver {
                 self.deviations.encoders[motor as usize] = true;
             }
             Action::HangMasked => self.obstruct(EXECUTOR_LINE, Obstacle::HangMasked, host),
-            Action::BusError => self.obstruct(TICK_LINE, Obstacle::BusError, host),
+            Action::BusError => self.obstruct(TICK_LINE, Obstacle::Reads(interference::NOTHING), host),
+            Action::StrayRead(address) => self.obstruct(TICK_LINE, Obstacle::Reads(address), host),
+            Action::StrayWrite(address) => self.obstruct(TICK_LINE, Obstacle::Writes(address), host),
+            Action::ReadMap => {
+                let vector = interference::vector(TICK_LINE);
+                if let Ok(original) = host.read(vector, Width::W32) {
+                    let reader = probe::map_reader(host, original);
+                    self.program(vector, Width::W32, reader, host);
+                }
+            }
+            Action::MeasureStack => {
+                for (which, (line, painted, _)) in (0..).zip(probe::MEASURED) {
+                    let vector = interference::vector(line);
+                    if let Ok(original) = host.read(vector, Width::W32) {
+                        let meter = probe::depth_meter(host, which, original, painted);
+                        self.program(vector, Width::W32, meter, host);
+                    }
+                }
+            }
             Action::ClockFails => {
                 part.fail_crystal(stop.at);
                 self.obstruct(TICK_LINE, Obstacle::ClockFailure, host);
@@ -374,12 +392,14 @@ impl BenchDriver {
         }
     }
 
-    /// Changes flash until the next reset.
+    /// Changes code or a vector until the next reset: in flash, or in ITCM, where the start puts everything anew.
     fn program(&mut self, address: u64, width: Width, value: u64, host: &mut dyn Host) {
-        if let Ok(original) = host.read(address, width)
-            && host.program(address, width, value).is_ok()
-        {
+        let Ok(original) = host.read(address, width) else { return };
+        if host.program(address, width, value).is_ok() {
             self.patched.push((address, width, original));
+        } else {
+            // It is RAM: it was read just now.
+            let _ = host.write(address, width, value);
         }
     }
 

@@ -17,14 +17,17 @@ const TRBUFF: u64 = 1 << 20;
 const FIRST_CONTROL: u64 = 0x10;
 const STREAM_STRIDE: u64 = 0x18;
 
-/// Where the code that masks interrupts lies: the end of SRAM3, which the firmware does not use.
-pub(crate) const STUB: u64 = 0x3004_7F00;
+/// Where the code put in a handler's way lies: the end of the ITCM, which the firmware leaves alone and lets run.
+pub(crate) const STUB: u64 = 0xFF00;
 /// Where interrupts are masked in the code of [`masking_stub`].
 pub(crate) const MASKED_AT: u64 = STUB + 2 * 12;
 /// `TIMx_CNT`.
 const COUNTER: u64 = 0x24;
 /// Nanoseconds of one round of the stub's loop: two instructions.
 const ROUND_NS: u64 = 2 * 1_000_000_000 / crate::board::INSTRUCTIONS_PER_SECOND.get();
+
+/// A word that code in ITCM may write, as the firmware does not: `S3M1AR` of DMA1, whose stream 3 it leaves alone.
+const SPARE_REGISTER: u64 = DMA1.base + 0x68;
 
 /// An address where nothing answers.
 pub(crate) const NOTHING: u64 = 0xA000_0000;
@@ -37,8 +40,10 @@ const NMI_PENDS: u64 = 1 << 31;
 pub(crate) enum Obstacle {
     /// All interrupts masked, and an endless loop.
     HangMasked,
-    /// A read where nothing answers.
-    BusError,
+    /// A read of this address.
+    Reads(u64),
+    /// A write to this address.
+    Writes(u64),
     /// The non-maskable interrupt, as the clock security system asks for it; the emulator's clock controller leaves that
     /// line out (RM0433 8.5.3).
     ClockFailure,
@@ -49,21 +54,26 @@ pub(crate) fn obstacle(host: &mut dyn Host, original: u64, what: Obstacle) -> u6
     let (code, words): (&[u16], Vec<u64>) = match what {
         Obstacle::HangMasked => (&[0xB672, 0xE7FE], vec![]), // cpsid i; b .
         // ldr r0, nothing; ldr r0, [r0]
-        Obstacle::BusError => (&[0x4800, 0x6800], vec![NOTHING]),
+        Obstacle::Reads(address) => (&[0x4800, 0x6800], vec![address]),
+        Obstacle::Writes(address) => (&[0x4800, 0x6000], vec![address]), // the same with str r0, [r0]
         // ldr r0, icsr; ldr r1, pends; str r1, [r0]; dsb; ldr r0, original; bx r0; nop
         Obstacle::ClockFailure => (
             &[0x4803, 0x4904, 0x6001, 0xF3BF, 0x8F4F, 0x4803, 0x4700, 0xBF00],
             vec![ICSR, NMI_PENDS, original | 1],
         ),
     };
-    // It is RAM the firmware leaves alone.
-    for (at, half) in (STUB..).step_by(2).zip(code) {
+    put(host, STUB, code, &words)
+}
+
+/// Puts code and the words behind it into RAM that the firmware leaves alone, and gives the word for a vector.
+pub(crate) fn put(host: &mut dyn Host, at: u64, code: &[u16], words: &[u64]) -> u64 {
+    for (at, half) in (at..).step_by(2).zip(code) {
         let _ = host.write(at, Width::W16, (*half).into());
     }
-    for (at, word) in (STUB + 2 * code.len() as u64..).step_by(4).zip(words) {
-        let _ = host.write(at, Width::W32, word);
+    for (at, word) in (at + 2 * code.len() as u64..).step_by(4).zip(words) {
+        let _ = host.write(at, Width::W32, *word);
     }
-    STUB | 1
+    at | 1
 }
 
 /// Locks the streams up that serve USART3 without `TRBUFF` (ES0392 rev 15, 2.20.4): their requests are no longer
@@ -87,21 +97,20 @@ pub(crate) fn read(part: &mut Part, at: VirtualNanos, address: u64) -> u64 {
     Operate::read(part, at, address, Width::W32).unwrap_or_default()
 }
 
-fn write(part: &mut Part, at: VirtualNanos, address: u64, value: u64) {
+pub(crate) fn write(part: &mut Part, at: VirtualNanos, address: u64, value: u64) {
     // The controllers' clocks are on: the firmware uses them.
     let _ = Operate::write(part, at, address, Width::W32, value);
 }
 
-/// Where the vector of an interrupt lies.
+/// Where the vector of an interrupt lies: the firmware has its table in ITCM (firmware/memory.x).
 pub(crate) const fn vector(line: u64) -> u64 {
-    0x0800_0000 + 4 * (16 + line)
+    0x1000 + 4 * (16 + line)
 }
 
 /// Puts code in front of the handler `original` that waits until TIM6 is within a microsecond after `from_ns` of its
-/// period and then masks all interrupts for `for_ns`, the next `times` times the interrupt comes. Gives the word for
-/// the interrupt's vector.
-pub(crate) fn masking_stub(host: &mut dyn Host, original: u64, times: u32, from_ns: u64, for_ns: u64) -> u64 {
-    const FLAG: u64 = STUB + 0x3C;
+/// period and then masks all interrupts for `for_ns`, each time the interrupt comes as long as [`mask_times`] says so. Gives
+/// the word for the interrupt's vector.
+pub(crate) fn masking_stub(host: &mut dyn Host, original: u64, from_ns: u64, for_ns: u64) -> u64 {
     let code: [u16; 20] = [
         0x4B09, // ldr  r3, flag
         0x6818, // ldr  r0, [r3]
@@ -125,13 +134,11 @@ pub(crate) fn masking_stub(host: &mut dyn Host, original: u64, times: u32, from_
         0xBF00, // nop
     ];
     let target = from_ns * 240 / 1000;
-    let words = [FLAG, TIM6.base + COUNTER, target, (for_ns / ROUND_NS).max(1), original | 1, times.into()];
-    // It is RAM the firmware leaves alone.
-    for (at, half) in (STUB..).step_by(2).zip(code) {
-        let _ = host.write(at, Width::W16, half.into());
-    }
-    for (at, word) in (STUB + 0x28..).step_by(4).zip(words) {
-        let _ = host.write(at, Width::W32, word);
-    }
-    STUB | 1
+    let words = [SPARE_REGISTER, TIM6.base + COUNTER, target, (for_ns / ROUND_NS).max(1), original | 1];
+    put(host, STUB, &code, &words)
+}
+
+/// Lets the code of [`masking_stub`] mask interrupts so often.
+pub(crate) fn mask_times(part: &mut Part, at: VirtualNanos, times: u32) {
+    write(part, at, SPARE_REGISTER, times.into());
 }

@@ -22,6 +22,7 @@ pub mod outside;
 pub mod part;
 pub mod pins;
 pub mod plant_side;
+pub mod probe;
 pub mod record;
 pub mod rtt;
 pub mod serial;

@@ -149,6 +149,14 @@ pub enum Action {
     HangMasked,
     /// The control tick begins with a read of an address where nothing answers, until the next reset.
     BusError,
+    /// The control tick begins with a read of this address.
+    StrayRead(u64),
+    /// The control tick begins with a write to this address.
+    StrayWrite(u64),
+    /// The next control tick copies the memory protection unit's registers to memory (`probe.rs`).
+    ReadMap,
+    /// From now on the stack below each interrupt's handler is painted and measured (`probe.rs`).
+    MeasureStack,
     /// The 8 MHz stop, and the clock security system notices.
     ClockFails,
     /// A bit of memory turns over.

@@ -9,6 +9,7 @@ mod defmt;
 mod faults;
 mod figures;
 mod interrupted;
+mod memory;
 mod runs;
 mod serve;
 mod silicon;
