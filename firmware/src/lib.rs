@@ -23,5 +23,6 @@ pub mod restart;
 pub mod self_test;
 pub mod settings;
 pub mod start;
+pub mod supply;
 pub mod tick;
 pub mod watchdog;

@@ -38,6 +38,11 @@ pub fn unexpected(number: i16) -> ! {
     stop(CrashKind::Exception, format_args!("unexpected exception {number}"))
 }
 
+/// Ends the firmware when the chip's supply falls.
+pub fn supply_fell() -> ! {
+    stop(CrashKind::Exception, format_args!("the chip's supply fell below 2.8 V"))
+}
+
 fn stop(kind: CrashKind, message: core::fmt::Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
     outputs::make_safe();

@@ -5,7 +5,7 @@
 //! tested is what is flashed.
 
 use crate::board::{self, Board};
-use crate::{clocks, crash_record, itcm, mpu, outputs, restart};
+use crate::{clocks, crash_record, itcm, mpu, outputs, restart, supply};
 use rig_link::message::{CrashRecord, ResetCause};
 
 /// What the start found.
@@ -30,6 +30,7 @@ pub fn start() -> Started {
     let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
     outputs::start();
     clocks::yield_to_the_tick();
+    supply::watch();
     if crystal {
         clocks::watch_crystal();
     } else {

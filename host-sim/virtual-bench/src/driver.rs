@@ -317,6 +317,7 @@ impl BenchDriver {
             }
             Action::HangMasked => self.obstruct(EXECUTOR_LINE, Obstacle::HangMasked, host),
             Action::BusError => self.obstruct(TICK_LINE, Obstacle::Reads(interference::NOTHING), host),
+            Action::SupplyFalls => self.obstruct(TICK_LINE, Obstacle::SupplyFalls, host),
             Action::StrayRead(address) => self.obstruct(TICK_LINE, Obstacle::Reads(address), host),
             Action::StrayWrite(address) => self.obstruct(TICK_LINE, Obstacle::Writes(address), host),
             Action::ReadMap => {

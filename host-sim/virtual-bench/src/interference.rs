@@ -35,6 +35,13 @@ pub(crate) const NOTHING: u64 = 0xA000_0000;
 const ICSR: u64 = 0xE000_ED04;
 const NMI_PENDS: u64 = 1 << 31;
 
+/// Pends another exception, and goes on to the handler:
+/// ldr r0, register; ldr r1, pends; str r1, [r0]; dsb; ldr r0, original; bx r0; nop
+const PEND: [u16; 8] = [0x4803, 0x4904, 0x6001, 0xF3BF, 0x8F4F, 0x4803, 0x4700, 0xBF00];
+/// `NVIC_ISPR0`, and the bit of the voltage detector (ARMv7-M B3.4.5, RM0433 table 147).
+const ISPR0: u64 = 0xE000_E200;
+const PVD_PENDS: u64 = 1 << 1;
+
 /// What stands before a handler in place of [`masking_stub`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Obstacle {
@@ -47,6 +54,8 @@ pub(crate) enum Obstacle {
     /// The non-maskable interrupt, as the clock security system asks for it; the emulator's clock controller leaves that
     /// line out (RM0433 8.5.3).
     ClockFailure,
+    /// The voltage detector's interrupt: the emulator's has no line to the interrupts' controller.
+    SupplyFalls,
 }
 
 /// Puts code in front of the handler `original`, and gives the word for the interrupt's vector.
@@ -56,11 +65,8 @@ pub(crate) fn obstacle(host: &mut dyn Host, original: u64, what: Obstacle) -> u6
         // ldr r0, nothing; ldr r0, [r0]
         Obstacle::Reads(address) => (&[0x4800, 0x6800], vec![address]),
         Obstacle::Writes(address) => (&[0x4800, 0x6000], vec![address]), // the same with str r0, [r0]
-        // ldr r0, icsr; ldr r1, pends; str r1, [r0]; dsb; ldr r0, original; bx r0; nop
-        Obstacle::ClockFailure => (
-            &[0x4803, 0x4904, 0x6001, 0xF3BF, 0x8F4F, 0x4803, 0x4700, 0xBF00],
-            vec![ICSR, NMI_PENDS, original | 1],
-        ),
+        Obstacle::ClockFailure => (&PEND, vec![ICSR, NMI_PENDS, original | 1]),
+        Obstacle::SupplyFalls => (&PEND, vec![ISPR0, PVD_PENDS, original | 1]),
     };
     put(host, STUB, code, &words)
 }

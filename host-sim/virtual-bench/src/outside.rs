@@ -159,6 +159,8 @@ pub enum Action {
     MeasureStack,
     /// The 8 MHz stop, and the clock security system notices.
     ClockFails,
+    /// The chip's supply falls, and the voltage detector notices.
+    SupplyFalls,
     /// A bit of memory turns over.
     FlipBit {
         /// Address of the byte.

@@ -236,6 +236,32 @@ fn the_watchdog_counts_on_while_a_debugger_holds_the_core() {
 }
 
 #[test]
+fn a_supply_that_falls_makes_safe() {
+    /// PWR_CR1, and EXTI_RTSR1 and EXTI_CPUIMR1 with the detector's line (RM0433 6.8.1, 20.6).
+    const CR1: u64 = 0x5802_4800;
+    const RTSR1: u64 = 0x5800_0000;
+    const CPUIMR1: u64 = 0x5800_0080;
+    let outcome = from(State::Sliding, |endpoint, listener| {
+        let registers =
+            (endpoint.register(CR1)?, endpoint.register(RTSR1)? >> 16, endpoint.register(CPUIMR1)? >> 16);
+        let at = endpoint.now_ns();
+        endpoint.act(Action::SupplyFalls)?;
+        listener.listen(endpoint, at + 200_000_000)?;
+        Ok((at, registers, listener.ask(endpoint, &Command::CrashRecord)?))
+    });
+    let (at, (control, rising, unmasked), record) = outcome.operator;
+    // PVDE, and PLS at its highest level.
+    assert_eq!((control >> 4 & 0b1111, rising & 1, unmasked & 1), (0b1101, 1, 1));
+    // The next tick is 5 µs into the period.
+    let safe = outcome.record.safe_for_good_from(at).unwrap() - at;
+    assert!(safe < 10_000, "safe after {safe} ns");
+    assert!(
+        matches!(&record, Answer::CrashRecord(Some(record)) if record.text.contains("supply fell")),
+        "{record:?}"
+    );
+}
+
+#[test]
 fn the_self_test_of_the_board_passes_with_the_shipped_start() {
     let elf = firmware_build::release_elf_of(firmware_build::SELF_TEST).unwrap();
     let program = Firmware::read(&elf).unwrap();
