@@ -29,5 +29,6 @@ pub mod serial;
 pub mod serve;
 pub mod sighting;
 pub mod soak;
+pub mod stack;
 
 pub use driver::PERIOD;

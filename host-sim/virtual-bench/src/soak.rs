@@ -1,7 +1,8 @@
 //! Soak: experiments and commands drawn by a seed, one after the other, for as long as asked.
 //!
 //! Asked at the end of each: is any row, event or frame lost by the counters of both ends, was a tick late or a scan missed,
-//! is the disc where the rig's counts say it is. At the end: how deep the stack went, and what flash was written.
+//! is the disc where the rig's counts say it is. At the end: how deep the stack went and how deep it would with every
+//! interrupt at once (`stack.rs`), and what flash was written.
 
 use crate::bench;
 use crate::elf::Firmware;
@@ -9,6 +10,7 @@ use crate::endpoint::Endpoint;
 use crate::endpoint_link::perform;
 use crate::error::BenchError;
 use crate::experiment::{ArmSwitch, Request, boot};
+use crate::stack::{self, Depth};
 use host_sim::files::experiment_file::ExperimentFile;
 use host_sim::link::ask::Ask;
 use host_sim::link::client::Client;
@@ -21,11 +23,6 @@ use serde::Serialize;
 
 /// Counts of a turn of the assumed rig's encoders.
 const COUNTS_PER_REV: f64 = 480_000.0;
-/// The stack (firmware/memory.x).
-const STACK: std::ops::Range<u64> = 0x2000_0000..0x2000_E000;
-/// What must be left of it, bytes: the mark has the deepest thread and whatever interrupts happened to come then. All of
-/// them above it at once take some 6 KB, of which the tick has 5.
-const STACK_RESERVE: u64 = 8 * 1024;
 /// The settings' sectors and the journal's (firmware/memory.x).
 const SETTINGS: std::ops::Range<u64> = 0x0810_0000..0x0816_0000;
 /// `speed_loop.bandwidth_hz`.
@@ -46,8 +43,8 @@ pub struct Soaked {
     pub ticks: u64,
     /// Largest difference between the disc's angle and the rig's count, in counts.
     pub angle_counts: f64,
-    /// Bytes of the stack used at most, and its size.
-    pub stack: (u64, u64),
+    /// How deep the stack goes.
+    pub stack: Depth,
     /// Words of flash written, of so many.
     pub flash_words: (u64, u64),
     /// Everything that was not as it must be.
@@ -89,10 +86,12 @@ fn operate(
         tell(now_s(endpoint));
     }
     soaked.seconds = now_s(endpoint);
-    let used = depth(&endpoint.memory(STACK.start, STACK.end - STACK.start)?);
-    soaked.stack = (used, STACK.end - STACK.start);
-    if used + STACK_RESERVE > STACK.end - STACK.start {
-        soaked.problems.push(format!("too much of the stack was used: {used} bytes"));
+    soaked.stack.mark = stack::mark(endpoint)?;
+    stack::measure_interrupts(endpoint)?;
+    round(endpoint, &mut chance, &mut soaked)?;
+    (soaked.stack.tick, soaked.stack.drivers) = stack::interrupts(endpoint)?;
+    if soaked.stack.left().is_none() {
+        soaked.problems.push(soaked.stack.to_string());
     }
     let flash = endpoint.memory(SETTINGS.start, SETTINGS.end - SETTINGS.start)?;
     let written = flash.chunks(32).filter(|word| word.iter().any(|byte| *byte != 0xFF)).count() as u64;
@@ -102,12 +101,6 @@ fn operate(
 
 fn now_s(endpoint: &Endpoint) -> f64 {
     endpoint.now_ns() as f64 * 1e-9
-}
-
-/// Bytes from the first that was ever written to the stack's begin: RAM is zero when the bench begins.
-fn depth(stack: &[u8]) -> u64 {
-    let untouched = stack.iter().take_while(|byte| **byte == 0).count();
-    (stack.len() - untouched) as u64
 }
 
 /// Some commands, an experiment, and a look at everything.

@@ -9,6 +9,8 @@ use object::{Object, ObjectSection, ObjectSegment, SectionKind};
 pub(crate) struct Size {
     /// What is written to flash: code, constants and the initial values of variables.
     flash: u64,
+    /// What is copied to the ITCM at start, of the 64 KiB there.
+    itcm: u64,
     /// Variables in RAM, set or zeroed at start; the stack is not in it.
     ram: u64,
 }
@@ -16,7 +18,13 @@ pub(crate) struct Size {
 impl fmt::Display for Size {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kib = |bytes: u64| bytes as f64 / 1024.0;
-        write!(f, "flash {:.1} KiB of 2048, variables in RAM {:.1} KiB", kib(self.flash), kib(self.ram))
+        write!(
+            f,
+            "flash {:.1} KiB of 2048, ITCM {:.1} KiB of 64, variables in RAM {:.1} KiB; the bench suite prints the stack",
+            kib(self.flash),
+            kib(self.itcm),
+            kib(self.ram)
+        )
     }
 }
 
@@ -40,5 +48,10 @@ pub(crate) fn of(path: &Path) -> Result<Size, String> {
         })
         .map(|section| section.size())
         .sum();
-    Ok(Size { flash, ram })
+    let itcm = elf
+        .sections()
+        .filter(|section| matches!(section.name(), Ok(".itcm" | ".itcm_vectors")))
+        .map(|section| section.size())
+        .sum();
+    Ok(Size { flash, itcm, ram })
 }

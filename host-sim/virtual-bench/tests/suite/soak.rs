@@ -7,6 +7,7 @@ use virtual_bench::soak::soak;
 fn twenty_seconds_of_experiments_and_commands_lose_nothing() {
     let soaked = soak(firmware(), 20.0, 3, &mut |_| ()).unwrap();
     println!("{soaked:#?}");
+    println!("{}", soaked.stack);
     assert!(soaked.problems.is_empty(), "{:#?}", soaked.problems);
     assert!(soaked.experiments >= 4 && soaked.rows > 4_000);
 }
