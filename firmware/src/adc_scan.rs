@@ -27,6 +27,8 @@ const ADC1_REQUEST: u8 = 9;
 /// Trigger input of ADC1 that TIM6's trigger output is wired to (RM0433, ADC external triggers).
 const TIM6_TRIGGER: u8 = 13;
 const ITEMS: u16 = SCAN as u16;
+/// Periods of the tick timer that a scan takes: 16.5 + 8.5 cycles of 25 MHz, 1 µs, for each channel.
+pub const PERIODS: u16 = (TICK_TIMER_HZ / 1_000_000) as u16 * ITEMS;
 
 /// Powers and calibrates the converter, and sets scan and DMA up. No scan runs before [`start_timer`].
 pub fn start(adc: Peri<'static, peripherals::ADC1>) {

@@ -92,6 +92,23 @@ pub fn take_link_buffers() -> Option<&'static mut LinkBuffers> {
     }
 }
 
+/// Bytes of the stack that were ever used, and its size: what lost the paint that the start put on all of it
+/// (`cortex-m-rt`, `paint-stack`). Reads what is left of the paint, some ten thousand words: for a thread, now and then.
+#[must_use]
+pub fn stack_used() -> (u32, u32) {
+    unsafe extern "C" {
+        static _stack_end: u32;
+        static _stack_start: u32;
+    }
+    let (end, begin) = (&raw const _stack_end, &raw const _stack_start);
+    let size = begin as usize - end as usize;
+    let painted = (0..size / 4)
+        // SAFETY: both symbols bound the stack's memory, aligned to words (`memory.x`); words are only read, and whole.
+        .take_while(|word| unsafe { end.add(*word).read_volatile() } == cortex_m_rt::STACK_PAINT_VALUE)
+        .count();
+    ((size - 4 * painted) as u32, size as u32)
+}
+
 /// The build id the linker made of the contents of the ELF; zeros if there is none.
 #[must_use]
 pub fn build_id() -> [u8; 20] {

@@ -32,7 +32,7 @@ use model_core::control::{
 };
 use rig_link::capture::CaptureTrigger;
 use rig_link::inputs::Inputs;
-use rig_link::telemetry::{Health, TelemetryRow};
+use rig_link::telemetry::{CycleHistogram, Health, StartHistogram, TelemetryRow};
 use static_cell::StaticCell;
 
 /// Cycles of a control period.
@@ -110,6 +110,8 @@ struct Tick {
     cycles_max: u32,
     start_min: u16,
     start_max: u16,
+    cycles_histogram: CycleHistogram,
+    start_histogram: StartHistogram,
 }
 
 struct TickCell(UnsafeCell<MaybeUninit<Tick>>);
@@ -182,6 +184,8 @@ pub fn start(config: ControlConfig, state: ControlState) -> Ends {
         cycles_max: 0,
         start_min: u16::MAX,
         start_max: 0,
+        cycles_histogram: CycleHistogram::default(),
+        start_histogram: StartHistogram::default(),
     };
     // SAFETY: the interrupts that use the cell are not enabled yet, and the `StaticCell`s above let this
     // function pass once only.
@@ -271,6 +275,7 @@ impl Tick {
             let since = adc_scan::since_trigger();
             self.start_min = self.start_min.min(since);
             self.start_max = self.start_max.max(since);
+            self.start_histogram.add(to_ns(since.saturating_sub(adc_scan::PERIODS)));
         }
         if self.orders.ready() {
             self.carry_out(&samples);
@@ -286,6 +291,7 @@ impl Tick {
         self.late = adc_scan::period_over();
         self.cycles = DWT::cycle_count().wrapping_sub(started);
         self.cycles_max = self.cycles_max.max(self.cycles);
+        self.cycles_histogram.add(self.cycles);
     }
 
     #[cold]
@@ -388,9 +394,12 @@ impl Tick {
             start_max_ns: to_ns(self.start_max),
             telemetry_lost: self.rows_lost,
             events_lost: self.state.events_lost(),
-            // The link's own counters are added where the record is sent.
+            // The link's own counters and the stack's mark are added where the record is sent.
             frames_rejected: 0,
             line_errors: 0,
+            stack: (0, 0),
+            cycles: self.cycles_histogram,
+            starts: self.start_histogram,
         };
         // Without a reader the next record says the same and more.
         let _ = self.health_out.enqueue(health);

@@ -1,6 +1,7 @@
 //! Messages to frames, frames to the DMA.
 
 use super::{FRAMES_REJECTED, LINE_ERRORS, OUTGOING};
+use crate::memory::stack_used;
 use crate::watchdog::{self, Thread};
 use core::sync::atomic::Ordering::Relaxed;
 use embassy_futures::select::select;
@@ -53,7 +54,7 @@ fn gather(
             Message::Telemetry(row)
         } else if let Some(health) = health.dequeue() {
             let (frames_rejected, line_errors) = (FRAMES_REJECTED.load(Relaxed), LINE_ERRORS.load(Relaxed));
-            Message::Health(Health { frames_rejected, line_errors, ..health })
+            Message::Health(Health { frames_rejected, line_errors, stack: stack_used(), ..health })
         } else {
             break;
         };

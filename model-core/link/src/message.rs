@@ -15,7 +15,7 @@ use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 /// Rises whenever an old peer would misread a message.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// The most bytes of a capture in one answer.
 pub const CAPTURE_CHUNK: usize = 480;

@@ -120,6 +120,48 @@ pub const CHANNELS: &[Channel] = &[
     },
 ];
 
+/// Bins of a histogram.
+pub const BINS: usize = 16;
+
+/// How often values of a range came, two ranges in each doubling: `0..b`, `b..1.5 b`, `1.5 b..2 b`, `2 b..3 b` and so on, the
+/// last without an end. `b` is 2 to the power `B`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Histogram<const B: u32> {
+    /// How often, by range.
+    pub counts: [u32; BINS],
+}
+
+impl<const B: u32> Histogram<B> {
+    /// Takes a value.
+    #[inline(always)]
+    pub fn add(&mut self, value: u32) {
+        let bin = if value >> B == 0 {
+            0
+        } else {
+            let top = 31 - value.leading_zeros();
+            let half = value >> (top - 1) & 1;
+            (1 + 2 * (top - B) + half) as usize
+        };
+        if let Some(count) = self.counts.get_mut(bin.min(BINS - 1)) {
+            *count = count.saturating_add(1);
+        }
+    }
+
+    /// Least value of a range.
+    #[must_use]
+    pub const fn begin(bin: usize) -> u32 {
+        match bin {
+            0 => 0,
+            bin => (2 + (bin as u32 - 1) % 2) << (B + (bin as u32 - 1) / 2) >> 1,
+        }
+    }
+}
+
+/// Of cycles of a tick: below 1024, then up to 98 304 and more, twice a period.
+pub type CycleHistogram = Histogram<10>;
+/// Of ns from the end of the scan to the start of the tick: below 64 ns, then up to 6 µs and more.
+pub type StartHistogram = Histogram<6>;
+
 /// Counters and state, for a display and for a run's summary.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Health {
@@ -153,4 +195,30 @@ pub struct Health {
     pub frames_rejected: u32,
     /// Errors of the serial line.
     pub line_errors: u32,
+    /// Cycles of the ticks so far.
+    pub cycles: CycleHistogram,
+    /// Start of the ticks so far after the earliest instant at which the scan can have ended, ns.
+    pub starts: StartHistogram,
+    /// Bytes of the stack that were ever used, and its size.
+    pub stack: (u32, u32),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_counted_where_its_range_begins_and_ends() {
+        for bin in 0..BINS {
+            let begin = CycleHistogram::begin(bin);
+            let end = if bin + 1 < BINS { CycleHistogram::begin(bin + 1) } else { u32::MAX };
+            let mut histogram = CycleHistogram::default();
+            histogram.add(begin);
+            histogram.add(end - 1);
+            assert_eq!(histogram.counts[bin], 2, "{begin}..{end}");
+        }
+        let begins = [0, 1, 2, 3, 4].map(CycleHistogram::begin);
+        assert_eq!(begins, [0, 1024, 1536, 2048, 3072]);
+        assert_eq!(StartHistogram::begin(1), 64);
+    }
 }

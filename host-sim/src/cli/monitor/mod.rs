@@ -3,6 +3,7 @@
 mod history;
 mod plain;
 mod screen;
+mod timing;
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use rig_link::telemetry::{Health, TelemetryRow};
 
-use super::{Each, Monitor, Watching};
+use super::{Each, Monitor, Watching, timing};
 use crate::cli::common::say;
 use crate::cli::interrupt;
 use crate::cli::port::Port;
@@ -38,7 +38,13 @@ fn line(row: &TelemetryRow, health: Option<&Health>) -> String {
     let limits = words::limits(row.limits);
     let limits = if limits.is_empty() { limits } else { format!("  {limits}") };
     let load = health.map_or(String::new(), |health| {
-        format!("  {} cycles, {} late", health.cycles_max, health.deadline_misses)
+        format!(
+            "  {} cycles, {} late, start {} ns late at most, stack {} %",
+            health.cycles_max,
+            health.deadline_misses,
+            health.start_max_ns.saturating_sub(health.start_min_ns),
+            timing::stack_percent(health)
+        )
     });
     format!(
         "{:9} M1 {:6.2} N m  M2 {:6.2} N m {:7.2} rad/s  normal {:6.1} N  friction {:6.3} N m  {:4.1} V{load}{fault}{limits}",

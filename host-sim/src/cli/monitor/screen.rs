@@ -1,6 +1,6 @@
 //! The screen: five plots and the state of the rig in words.
 //!
-//! Everything fits 80 × 24. Two lines in one plot differ by their marks, a drawn line and dots, not by colour alone.
+//! Everything fits 80 × 24, but for the histograms of the ticks' times, which come last. Two lines in one plot differ by their marks, a drawn line and dots, not by colour alone.
 
 use std::io::{Stdout, stdout};
 use std::time::{Duration, Instant};
@@ -21,6 +21,7 @@ use ratatui::widgets::{Axis, Block, Borders, Chart, Dataset, GraphType, Paragrap
 use rig_link::telemetry::TelemetryRow;
 
 use super::history::History;
+use super::timing;
 use crate::input_error::InputError;
 use crate::link::words;
 
@@ -249,6 +250,15 @@ fn state(history: &History, colour: bool) -> Vec<Line<'static>> {
         "link: {} rows lost, {} frames damaged",
         history.rows_lost, history.frames_rejected
     )));
+    // Last, for larger windows: what must be seen in 80 × 24 is above.
+    if let Some(health) = &history.health {
+        lines.push(Line::raw(format!("ticks: {}", timing::shares(&health.cycles, "cycles"))));
+        lines.push(Line::raw(format!(
+            "start after the scan: {}; stack {} %",
+            timing::shares(&health.starts, "ns"),
+            timing::stack_percent(health)
+        )));
+    }
     lines
 }
 

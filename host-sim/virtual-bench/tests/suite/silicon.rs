@@ -4,7 +4,7 @@ use super::firmware;
 use host_sim::files::experiment_file::ExperimentFile;
 use model_core::control::{Fault, Mode};
 use rig_link::message::{Answer, Command, Rejection};
-use rig_link::telemetry::Health;
+use rig_link::telemetry::{BINS, Health, StartHistogram};
 use std::sync::OnceLock;
 use virtual_bench::bench::{self, Outcome};
 use virtual_bench::campaign::listening_host::ListeningHost;
@@ -18,6 +18,7 @@ use virtual_bench::firmware_build;
 use virtual_bench::outside::{Action, ReferenceWire};
 use virtual_bench::part::Motor;
 use virtual_bench::record::Saved;
+use virtual_bench::stack;
 
 /// The rig kept in this state, made once.
 fn kept(state: State) -> &'static Saved {
@@ -53,6 +54,29 @@ fn ticks_come_once_a_period_though_the_write_that_acknowledges_it_is_posted() {
     })
     .operator;
     assert_eq!((ticks.instructions.count, ticks.late), (1000, 0), "control ticks in a tenth of a second");
+}
+
+#[test]
+fn the_histograms_hold_every_tick_and_the_stack_its_mark() {
+    let (health, mark) = from(State::Sliding, |endpoint, listener| {
+        // In one tick in twenty the start is 4.5 µs late.
+        endpoint.act(Action::MaskInterrupts { times: 20, from_ns: 3_500, for_ns: 6_000 })?;
+        let health = health(endpoint, listener)?;
+        Ok((health, stack::mark(endpoint)?))
+    })
+    .operator;
+    let ticks = |counts: [u32; BINS]| counts.iter().map(|count| u64::from(*count)).sum::<u64>();
+    assert_eq!(ticks(health.cycles.counts), health.tick, "{health:?}");
+    assert_eq!(ticks(health.starts.counts) + u64::from(health.missed_scans), health.tick + 1, "{health:?}");
+    let late: u32 = (0..BINS)
+        .filter(|bin| StartHistogram::begin(*bin) >= 3_000)
+        .map(|bin| health.starts.counts[bin])
+        .sum();
+    assert!(late >= 10, "starts that were made late are not in the histogram: {health:?}");
+    let (used, size) = health.stack;
+    assert_eq!(u64::from(size), stack::STACK.end - stack::STACK.start);
+    // The mark may have moved since the record.
+    assert!(used > 1_000 && mark - u64::from(used) < 2_000, "{used} of {size}, found {mark}");
 }
 
 #[test]
