@@ -20,4 +20,3 @@ pub mod rig_file;
 pub mod signal;
 pub mod strain_gauges;
 pub mod toml_tree;
-pub mod two_motor_file;

@@ -272,7 +272,7 @@ fn lever_gain(table: &TableReader<'_>) -> Result<Option<f64>, InputError> {
 }
 
 /// Inertia of the discs that are put on besides.
-pub(super) fn inertia_discs(table: &TableReader<'_>) -> Result<f64, InputError> {
+pub(crate) fn inertia_discs(table: &TableReader<'_>) -> Result<f64, InputError> {
     let count = table.integer("inertia_discs", 0, 100)?.unwrap_or(0);
     let each = table.number("inertia_disc_kg_m2", POSITIVE)?;
     match (count, each) {

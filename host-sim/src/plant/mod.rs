@@ -27,6 +27,7 @@ mod noise;
 mod normal_load;
 pub mod parameters;
 mod step;
+pub mod two_motor_file;
 pub mod two_motors;
 
 pub use analogue::PinVoltages;

@@ -146,7 +146,7 @@ impl Run {
 mod tests {
     use super::*;
     use crate::files::experiment_file::Study;
-    use crate::files::two_motor_file::read_or_assumed;
+    use crate::plant::two_motor_file::read_or_assumed;
 
     #[test]
     fn the_original_experiment_loads_the_shaft_and_its_log_is_one_of_a_drive() {

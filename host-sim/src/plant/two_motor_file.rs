@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use super::overrides;
-use super::toml_tree::{Allowed, Document, NOT_NEGATIVE, POSITIVE, TableReader};
+use crate::files::overrides;
+use crate::files::toml_tree::{Allowed, Document, NOT_NEGATIVE, POSITIVE, TableReader};
 use crate::input_error::InputError;
 use crate::plant::parameters::{BearingParameters, DriveParameters, ShaftParameters};
 use crate::plant::two_motors::{MotorParameters, ResolverParameters, TwoMotorParameters};
@@ -55,7 +55,7 @@ fn motor(table: &TableReader<'_>) -> Result<MotorParameters, InputError> {
             rated_torque_nm: table.required_number("rated_torque_nm", POSITIVE)?,
             torque_lag_s: table.required_number("torque_lag_s", NOT_NEGATIVE)?,
         },
-        inertia_kg_m2: own + super::rig_file::inertia_discs(table)?,
+        inertia_kg_m2: own + crate::files::rig_file::inertia_discs(table)?,
         bearing: BearingParameters {
             coulomb_nm: table.required_number("coulomb_nm", NOT_NEGATIVE)?,
             viscous_nm_s: table.required_number("viscous_nm_s_per_rad", NOT_NEGATIVE)?,
