@@ -2,7 +2,7 @@
 //!
 //! | clock | rate | why |
 //! |---|---|---|
-//! | HSE | 8 MHz | the ST-LINK's crystal: speeds and times are derived from it |
+//! | HSE | 8 MHz | from the ST-LINK (PINS.md): speeds and times are derived from it |
 //! | PLL1 P | 8 / 2 · 240 / 2 = 480 MHz | the core's highest rate, in voltage scale 0 |
 //! | AHB | 240 MHz | its highest rate |
 //! | APB1 to APB4 | 120 MHz | their highest rate; timers run at twice that |

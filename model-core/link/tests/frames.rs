@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use rig_link::frame::{FrameError, MAX_FRAME, Receiver, encode};
 use rig_link::message::{Answer, Command, Message, Rejection, Request};
 use rig_link::program::{ProgramMode, ProgramSegment, ProgramShape};
-use rig_link::telemetry::TelemetryRow;
+use rig_link::telemetry::{Health, TelemetryRow};
 
 fn frame_of<M: serde::Serialize>(message: &M) -> std::vec::Vec<u8> {
     let mut out = [0; MAX_FRAME];
@@ -172,9 +172,9 @@ fn a_telemetry_row_at_1_khz_uses_less_than_two_thirds_of_the_line() {
 /// The wire format is the order and the types of the members: who changes them raises `PROTOCOL_VERSION` and
 /// writes the new bytes here.
 #[test]
-fn the_bytes_of_version_3_stay_as_they_are() {
+fn the_bytes_of_version_4_stay_as_they_are() {
     use rig_link::message::PROTOCOL_VERSION;
-    assert_eq!(PROTOCOL_VERSION, 3);
+    assert_eq!(PROTOCOL_VERSION, 4);
     let hex = |bytes: std::vec::Vec<u8>| {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect::<std::string::String>()
     };
@@ -199,5 +199,12 @@ fn the_bytes_of_version_3_stay_as_they_are() {
     assert_eq!(
         hex(frame_of(&Message::Telemetry(row))),
         "0a0107f0a204cdcc4c4001010101010101010101010104ffcb3a0101010101010101010101010103c84001010101010101020307050247a09c010101063fd3afa1fd00"
+    );
+    let mut health = Health { tick: 70_000, cycles_max: 3_516, stack: (38_310, 57_344), ..Health::default() };
+    [1_000, 2_642, 2_642, 40_000].into_iter().for_each(|cycles| health.cycles.add(cycles));
+    health.starts.add(640);
+    assert_eq!(
+        hex(frame_of(&Message::Health(health))),
+        "0502f0a20401010101010103bc1b010101010102010102020101010101010201010101010101010101010201010101010101010ba6ab0280c0032fbafdaa00"
     );
 }
