@@ -4,9 +4,10 @@
 //! translate the firmware anew each time, which costs more than what a short branch runs. A process that is forked
 //! shares all memory with the one it came from until it writes to it, so a branch begins within a millisecond.
 //!
-//! The trunk's operator asks for one result after the other, and works on it while no branch begins: so it holds nothing
-//! that a branch would find locked. The thread that forks is the emulator's own. In the branch it is the only thread: the operator of before is not there,
-//! and a new one begins. The branch never returns to the code around the run; it ends when its operator is done.
+//! The trunk's operator asks for one result after the other, and works on it while no branch begins: all it can hold at a
+//! fork are the locks of its channel, as it goes into its wait, and a branch never touches that channel, not even to close it.
+//! The thread that forks is the emulator's own. In the branch it is the only thread: the operator of before is not there, and
+//! a new one begins. The branch never returns to the code around the run; it ends when its operator is done.
 
 use crate::endpoint::{BenchEnd, Endpoint, endpoint_at};
 use crate::error::BenchError;
@@ -100,8 +101,9 @@ impl Branches {
             && let Some((nth, job)) = self.waiting.pop_front()
         {
             let (reader, out) = io::pipe()?;
-            // SAFETY: the branch goes on in the code of this thread alone, whose other threads wait in channels and hold no
-            // lock it takes: the allocator and the standard streams put their own in order over a fork.
+            // SAFETY: the branch goes on in the code of this thread alone. The operator's thread holds no lock that it takes: it
+            // waits in its channel, or is about to, and the branch leaves that channel alone (`driver.rs`). The allocator puts
+            // its own locks in order over a fork.
             match unsafe { libc::fork() } {
                 -1 => return Err(io::Error::last_os_error()),
                 0 => return Ok(Side::Branch(Begin { job, out })),

@@ -470,7 +470,10 @@ impl BenchDriver {
                         Ok(Side::Branch(job)) => {
                             // In a process of its own, with an operator of its own; the other branches are the trunk's.
                             self.branches = Branches::default();
-                            self.end = job.begin(stop.at.0);
+                            let trunks = std::mem::replace(&mut self.end, job.begin(stop.at.0));
+                            // Never closed: the trunk's operator may have been on its way into its wait at the fork, and hold a
+                            // lock of the channel that nobody here will ever release.
+                            std::mem::forget(trunks);
                             continue;
                         }
                         Err(error) => Err(error.to_string()),
