@@ -1,6 +1,7 @@
 //! The start that every program for this board shares: safe first, then clock, pins, outputs, core.
 //!
-//! The order matters: the memory map traps what goes wrong from then on, and drive enables are driven low before anything else is set up, and the DAC starts at zero torque.
+//! The order matters: the memory map comes first and traps what goes wrong from then on, drive enables are driven low before
+//! anything else is set up, and the DAC starts at zero torque.
 //! Nothing here enables a drive. The firmware and the tests on the board begin with the same call, so that what is
 //! tested is what is flashed.
 

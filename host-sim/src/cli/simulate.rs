@@ -19,7 +19,7 @@ use crate::input_error::InputError;
 use crate::lockstep::Setup;
 use crate::plant::two_motor_file;
 use crate::plant::two_motors::TwoMotorParameters;
-use crate::plant::{ElementParameters, PERIOD_S, left_out};
+use crate::plant::{ElementParameters, PERIOD_S, PERIODS_PER_S, left_out};
 use crate::provenance;
 use crate::report::{Block, Chart, Page, value};
 use crate::studies::candidate_models::rubber_of;
@@ -124,7 +124,7 @@ fn closed_loop(
     let mut progress = Progress::new(&experiment.name, u64::from(setup.experiment.duration_ticks));
     let run = ClosedLoop::run(experiment, &setup, |done, _| progress.set(done as u64))?;
     drop(progress);
-    let every = (1.0 / PERIOD_S).round() as usize / experiment.log_rate_hz as usize;
+    let every = PERIODS_PER_S / experiment.log_rate_hz as usize;
     let mut log = run.recording.log(every, setup.plant.counts_per_rev);
     let mut note = |key: &str, value: String| log.metadata.push((key.into(), value));
     note("experiment", experiment.name.clone());

@@ -1,8 +1,9 @@
 //! The experiment file: what each motor is asked for over time, or a study without motors.
 //!
 //! Four kinds. `closed_loop` (the default) has lists of segments, `[[m1]]` and `[[m2]]`; a segment lasts
-//! until the next one of its motor starts. `two_motors` has the same lists, of torques, for the original rig. `patch_crossing` draws elements across a contact patch at a
-//! prescribed slip, `speed_sweep` takes the steady friction over speed; both need no motors.
+//! until the next one of its motor starts. `two_motors` has the same lists, of torques, for the original rig.
+//! `patch_crossing` draws elements across a contact patch at a prescribed slip, `speed_sweep` takes the steady friction
+//! over speed; both need no motors.
 //! Quantities carry their unit in the key: `torque_nm`, `torque_fraction` (of the motor's rated torque),
 //! `speed_rad_s`, `speed_rpm`. A segment gives its value (`torque_nm = 3.0`), a ramp also where it ends
 //! (`end_torque_nm`, `ramp_s`), a sine its mean under the plain key, `amplitude_torque_nm`,

@@ -3,13 +3,9 @@
 use crate::files::log::Log;
 use crate::files::number::{angle_rad, widen};
 use crate::files::signal::Signal;
-use crate::plant::{PERIOD_S, Truth};
+use crate::plant::{Truth, time_s};
 use model_core::control::{Fault, LimitSet, Record};
 use rig_link::telemetry::CHANNELS;
-
-/// Control periods of a second; a whole number.
-const TICKS_PER_S: f64 = 1e4;
-const _: () = assert!((TICKS_PER_S * PERIOD_S - 1.0).abs() < 1e-12);
 
 /// One tick of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,10 +34,8 @@ pub struct Recording {
 impl Recording {
     /// Time of a frame since the start of the experiment.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)]
     pub fn time_s(&self, frame: usize) -> f64 {
-        // Dividing by a whole number gives the nearest f64 to the decimal time.
-        frame as f64 / TICKS_PER_S
+        time_s(frame)
     }
 
     /// One signal over all frames.

@@ -47,6 +47,15 @@ use step::{Activity, Grid, State};
 
 /// The control period.
 pub const PERIOD_S: f64 = 1e-4;
+/// Control periods of a second.
+pub const PERIODS_PER_S: usize = 10_000;
+const _: () = assert!((PERIODS_PER_S as f64 * PERIOD_S - 1.0).abs() < 1e-12);
+
+/// Time of a control period, s: dividing by a whole number gives the nearest f64 to the decimal time.
+#[must_use]
+pub fn time_s(period: usize) -> f64 {
+    period as f64 / PERIODS_PER_S as f64
+}
 
 /// What drives the plant over one control period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

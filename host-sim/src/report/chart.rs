@@ -222,7 +222,8 @@ fn push_units(text: &mut String, negative: bool, units: u32, decimals: usize) {
     if negative && units > 0 {
         text.push('-');
     }
-    text.push_str(itoa(whole, &mut [0; 10]));
+    let mut buffer = itoa::Buffer::new();
+    text.push_str(buffer.format(whole));
     if part == 0 {
         return;
     }
@@ -232,27 +233,9 @@ fn push_units(text: &mut String, negative: bool, units: u32, decimals: usize) {
         places -= 1;
     }
     text.push('.');
-    let mut buffer = [0; 10];
-    let digits = itoa(part, &mut buffer);
+    let digits = buffer.format(part);
     (digits.len()..places).for_each(|_| text.push('0'));
     text.push_str(digits);
-}
-
-/// The digits of a number.
-fn itoa(mut value: u32, buffer: &mut [u8; 10]) -> &str {
-    let mut from = buffer.len();
-    loop {
-        from -= 1;
-        #[allow(clippy::cast_possible_truncation)]
-        let digit = (value % 10) as u8;
-        buffer[from] = b'0' + digit;
-        value /= 10;
-        if value == 0 {
-            break;
-        }
-    }
-    // Digits are text.
-    std::str::from_utf8(&buffer[from..]).unwrap_or_default()
 }
 
 fn push_exactly(text: &mut String, value: f64, decimals: usize) {

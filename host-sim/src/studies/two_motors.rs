@@ -4,9 +4,9 @@ use crate::files::experiment_file::{ExperimentFile, Quantity, Segment};
 use crate::files::log::Log;
 use crate::files::signal::Signal;
 use crate::input_error::InputError;
-use crate::plant::PERIOD_S;
 use crate::plant::parameters::NoiseParameters;
 use crate::plant::two_motors::{TwoMotorParameters, TwoMotorReading, TwoMotorTruth, TwoMotors};
+use crate::plant::{PERIOD_S, PERIODS_PER_S, time_s};
 use crate::report::{Chart, Line, Panel, Role};
 
 /// A run; one entry a sample of the log.
@@ -46,10 +46,10 @@ pub fn run(
     let rated = [rig.m1.drive.rated_torque_nm, rig.m2.drive.rated_torque_nm];
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let periods = (experiment.duration_s / PERIOD_S).round() as usize;
-    let every = (1.0 / PERIOD_S).round() as usize / experiment.log_rate_hz as usize;
+    let every = PERIODS_PER_S / experiment.log_rate_hz as usize;
     let mut out = Run { time_s: vec![], asked_nm: vec![], read: vec![], truth: vec![] };
     for k in 0..periods {
-        let time_s = k as f64 / (1.0 / PERIOD_S).round();
+        let time_s = time_s(k);
         let asked_nm = [torque_nm(m1, rated[0], time_s), torque_nm(m2, rated[1], time_s)];
         for (name, asked, most) in [("m1", asked_nm[0], rated[0]), ("m2", asked_nm[1], rated[1])] {
             if asked.abs() > most {

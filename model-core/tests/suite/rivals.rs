@@ -64,8 +64,12 @@ fn stepped(p: &FrictionParameters<f64>) -> Vec<f64> {
 }
 
 fn assert_follows(p: &FrictionParameters<f64>, equations: &Equations, first: &[f64], period: usize) {
-    let (exact, seen) = (runge_kutta(equations, first, period), stepped(p));
-    let error: f64 = exact.iter().zip(&seen).map(|(a, b)| (a - b).powi(2)).sum();
+    assert_near(p, &runge_kutta(equations, first, period));
+}
+
+/// The model in steps of a control period is near these forces.
+fn assert_near(p: &FrictionParameters<f64>, exact: &[f64]) {
+    let error: f64 = exact.iter().zip(&stepped(p)).map(|(a, b)| (a - b).powi(2)).sum();
     let nrmse = (error / exact.iter().map(|a| a * a).sum::<f64>()).sqrt();
     println!("{}: NRMSE {nrmse:.1e}", p.kind().name());
     assert!(nrmse < 1e-3, "{}: {nrmse}", p.kind().name());
@@ -142,11 +146,9 @@ fn a_series_element_follows_its_equations() {
     assert_follows(&p, &branched(p, vec![]), &[0.0; 2], 100);
 }
 
-#[test]
-fn a_brush_follows_its_equations() {
-    let p = FrictionParameters::<f64>::typical(ModelKind::Brush);
-    let n = |name| p.get(name).unwrap();
-    let (stiffness, mu_s, mu_c) = (n("c_n_per_m"), n("mu_s"), n("mu_c"));
+/// Force of a spring at every control period that breaks loose at `mu_s` times the load and slides with a coefficient of the
+/// speed until the motion turns.
+fn brush(stiffness: f64, mu_s: f64, coefficient: impl Fn(f64) -> f64) -> Vec<f64> {
     let period = 100;
     let step = PERIOD_S / period as f64;
     let steps = (DURATION_S / step).round() as usize;
@@ -160,17 +162,21 @@ fn a_brush_follows_its_equations() {
             slips = force.abs() >= mu_s * n;
         }
         if slips {
-            force = (mu_c * n).copysign(v);
+            force = (coefficient(v) * n).copysign(v);
         }
         if (k + 1) % period == 0 {
             out.push(force);
         }
     }
-    let seen = stepped(&p);
-    let error: f64 = out.iter().zip(&seen).map(|(a, b)| (a - b).powi(2)).sum();
-    let nrmse = (error / out.iter().map(|a| a * a).sum::<f64>()).sqrt();
-    println!("brush: NRMSE {nrmse:.1e}");
-    assert!(nrmse < 1e-3, "{nrmse}");
+    out
+}
+
+#[test]
+fn a_brush_follows_its_equations() {
+    let p = FrictionParameters::<f64>::typical(ModelKind::Brush);
+    let n = |name| p.get(name).unwrap();
+    let (stiffness, mu_s, mu_c) = (n("c_n_per_m"), n("mu_s"), n("mu_c"));
+    assert_near(&p, &brush(stiffness, mu_s, |_| mu_c));
 }
 
 #[test]
@@ -217,30 +223,7 @@ fn a_brush_with_a_curve_follows_its_equations() {
     let p = FrictionParameters::typical(ModelKind::BrushCurve)
         .with("static_excess", 0.1)
         .with("a2_s_per_m", 0.05);
-    let period = 100;
-    let step = PERIOD_S / period as f64;
-    let steps = (DURATION_S / step).round() as usize;
-    let (mut force, mut slips, mut last_v, mut out) = (0.0f64, false, 0.0f64, Vec::new());
-    for k in 0..steps {
-        let ((v, _), (_, n)) = (motion((k as f64 + 0.5) * step), motion((k as f64 + 1.0) * step));
-        slips &= v * last_v > 0.0;
-        last_v = v;
-        if !slips {
-            force += 3e4 * v * step;
-            slips = force.abs() >= 1.3 * n;
-        }
-        if slips {
-            force = (n * (g(&p, v) + 0.05 * v.abs())).copysign(v);
-        }
-        if (k + 1) % period == 0 {
-            out.push(force);
-        }
-    }
-    let seen = stepped(&p);
-    let error: f64 = out.iter().zip(&seen).map(|(a, b)| (a - b).powi(2)).sum();
-    let nrmse = (error / out.iter().map(|a| a * a).sum::<f64>()).sqrt();
-    println!("brush_curve: NRMSE {nrmse:.1e}");
-    assert!(nrmse < 1e-3, "{nrmse}");
+    assert_near(&p, &brush(3e4, 1.3, |v| g(&p, v) + 0.05 * v.abs()));
 }
 
 #[test]
@@ -289,11 +272,7 @@ fn maxwell_slip_follows_its_equations() {
             out.push(force.iter().sum::<f64>());
         }
     }
-    let seen = stepped(&p);
-    let error: f64 = out.iter().zip(&seen).map(|(a, b)| (a - b).powi(2)).sum();
-    let nrmse = (error / out.iter().map(|a| a * a).sum::<f64>()).sqrt();
-    println!("maxwell_slip: NRMSE {nrmse:.1e}");
-    assert!(nrmse < 1e-3, "{nrmse}");
+    assert_near(&p, &out);
 }
 
 /// Block and contact of rate and state, with ln θ as the state; V from the balance by bisection in ln V.

@@ -1,6 +1,7 @@
 //! The screen: five plots and the state of the rig in words.
 //!
-//! Everything fits 80 × 24, but for the histograms of the ticks' times, which come last. Two lines in one plot differ by their marks, a drawn line and dots, not by colour alone.
+//! Everything fits 80 × 24, but for the histograms of the ticks' times, which come last. Two lines in one plot differ by
+//! their marks, a drawn line and dots, not by colour alone.
 
 use std::io::{Stdout, stdout};
 use std::time::{Duration, Instant};
