@@ -5,6 +5,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::runs::{ClosedLoop, Runs};
 use crate::files::experiment_file::{ExperimentFile, PatchCrossing};
@@ -16,10 +17,13 @@ use crate::plant::PERIOD_S;
 use crate::report::{Role, Table};
 use crate::studies::patch_crossing;
 use crate::studies::speed_sweep::BELL;
+use crate::summary::Summary;
 use model_core::friction::static_curve::Bell;
 
 /// Natural frequencies of the normal force that are tried; the assumed one is 120 Hz.
 const PRESS_MODES_HZ: [f64; 6] = [20.0, 40.0, 60.0, 90.0, 120.0, 200.0];
+/// Damping ratios of that mode that are tried with it; the assumed one is 0.25.
+const PRESS_DAMPING_RATIOS: [f64; 4] = [0.1, 0.25, 0.5, 0.8];
 /// When the load steps in Figs. 18–21, s.
 const LOAD_STEP_S: f64 = 4.0;
 
@@ -46,13 +50,16 @@ fn row(statement: &str, reproduced: &str, found: String, command: &str) -> Vec<S
     vec![statement.into(), reproduced.into(), found, format!("`{command}`")]
 }
 
-fn run(figure: &str, changes: &[(&str, f64)]) -> Result<ClosedLoop, InputError> {
-    let changes: Vec<(String, String)> =
-        changes.iter().map(|(key, value)| ((*key).to_string(), format!("{value:?}"))).collect();
-    let (rig, model) = (RigFile::assumed_rig(&changes)?, ModelFile::assumed(&[])?);
-    let experiment = ExperimentFile::named_or_read(figure, &[])?;
-    let setup = Setup::from_files(&experiment, &rig, &model, &model)?;
-    ClosedLoop::run(&experiment, &setup, |_, _| {})
+/// A figure once with each of these changes to the assumed rig.
+fn summaries(figure: &str, changed: &[Vec<(&str, f64)>]) -> Result<Vec<Summary>, InputError> {
+    let (experiment, model) = (ExperimentFile::named_or_read(figure, &[])?, ModelFile::assumed(&[])?);
+    let one = |changes: &Vec<(&str, f64)>| {
+        let changes: Vec<(String, String)> =
+            changes.iter().map(|(key, value)| ((*key).to_string(), format!("{value:?}"))).collect();
+        let setup = Setup::from_files(&experiment, &RigFile::assumed_rig(&changes)?, &model, &model)?;
+        Ok(ClosedLoop::run(&experiment, &setup, |_, _| {})?.summary)
+    };
+    changed.par_iter().map(one).collect()
 }
 
 /// ∮ T dθ in a period of 2 rad/s, mean of the whole periods after the first of a sine that begins at 0.5 s.
@@ -138,8 +145,8 @@ fn press_mode_row() -> Result<Vec<String>, InputError> {
     let mut all = true;
     for figure in ["fig18", "fig19", "fig20"] {
         let mut fails = Vec::new();
-        for mode_hz in PRESS_MODES_HZ {
-            let s = run(figure, &[("pressure.mode_hz", mode_hz)])?.summary;
+        let changed = PRESS_MODES_HZ.map(|mode_hz| vec![("pressure.mode_hz", mode_hz)]);
+        for (mode_hz, s) in PRESS_MODES_HZ.iter().zip(summaries(figure, &changed)?) {
             let after = s.friction_peak_time_s.zip(s.normal_settled_time_s).is_some_and(|(f, n)| f > n);
             if !after {
                 fails.push(format!("{mode_hz:.0}"));
@@ -168,13 +175,18 @@ fn press_mode_row() -> Result<Vec<String>, InputError> {
 fn later_load_row() -> Result<Vec<String>, InputError> {
     let mut each = Vec::new();
     let mut holds = false;
-    for mode_hz in PRESS_MODES_HZ {
-        for damping in [0.1, 0.25, 0.5, 0.8] {
-            let changes = [("pressure.mode_hz", mode_hz), ("pressure.damping_ratio", damping)];
-            if let Some(later) = run("fig21", &changes)?.summary.friction_ratio_at_same_normal {
-                holds |= later < 0.95;
-                each.push(format!("{mode_hz:.0} Hz, {damping}: {later:.2}"));
-            }
+    let modes: Vec<(f64, f64)> = PRESS_MODES_HZ
+        .iter()
+        .flat_map(|mode_hz| PRESS_DAMPING_RATIOS.map(|damping| (*mode_hz, damping)))
+        .collect();
+    let changed: Vec<_> = modes
+        .iter()
+        .map(|(mode_hz, damping)| vec![("pressure.mode_hz", *mode_hz), ("pressure.damping_ratio", *damping)])
+        .collect();
+    for ((mode_hz, damping), summary) in modes.iter().zip(summaries("fig21", &changed)?) {
+        if let Some(later) = summary.friction_ratio_at_same_normal {
+            holds |= later < 0.95;
+            each.push(format!("{mode_hz:.0} Hz, {damping}: {later:.2}"));
         }
     }
     let found = if each.is_empty() {
@@ -194,10 +206,10 @@ fn later_load_row() -> Result<Vec<String>, InputError> {
 }
 
 fn preload_row() -> Result<Vec<String>, InputError> {
-    let settled = |preload: f64| -> Result<f64, InputError> {
-        Ok(run("fig18", &[("pressure.preload_n", preload)])?.summary.normal_settled_n.unwrap_or(0.0))
-    };
-    let (soft, hard) = (settled(4.0)?, settled(8.0)?);
+    let changed = [4.0, 8.0].map(|preload_n| vec![("pressure.preload_n", preload_n)]);
+    let settled: Vec<f64> =
+        summaries("fig18", &changed)?.iter().map(|s| s.normal_settled_n.unwrap_or(0.0)).collect();
+    let (soft, hard) = (settled[0], settled[1]);
     Ok(row(
         "Softer springs give more pressure.",
         if soft > hard { "yes" } else { "no" },

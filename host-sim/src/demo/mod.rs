@@ -39,9 +39,10 @@ pub struct Demo {
 /// What a run refuses.
 pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputError> {
     let runs = Runs::new(&mut progress)?;
-    let case_study = CaseStudy::new(&runs)?;
+    let (case_study, axes) = rayon::join(|| CaseStudy::new(&runs), || axes::table(&runs));
+    let case_study = case_study?;
     progress(runs::STEPS, runs::STEPS, "report");
-    let page = page(&runs, &case_study, axes::table(&runs)?);
+    let page = page(&runs, &case_study, axes?);
     let mut table = terminal_table(&runs);
     table.push_str(&format!(
         "{:<8} {:<53} {}\n",

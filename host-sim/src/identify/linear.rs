@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
+use wide::f64x4;
 
 /// The Cholesky factor of a matrix; where rounding has made it indefinite a ridge is added that grows until it is not.
 pub fn factor(matrix: &DMatrix<f64>) -> Cholesky<f64, Dyn> {
@@ -101,15 +102,14 @@ pub fn non_negative(normal: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64>
 /// Sum of products, in eight lanes so that it can be computed in parallel; the order of summation is fixed.
 #[inline]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
-        for i in 0..8 {
-            lanes[i] += x[i] * y[i];
-        }
+    let ((a8, a_rest), (b8, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    let [mut low, mut high] = [f64x4::ZERO; 2];
+    for ([a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]) in a8.iter().zip(b8) {
+        low += f64x4::from([*a0, *a1, *a2, *a3]) * f64x4::from([*b0, *b1, *b2, *b3]);
+        high += f64x4::from([*a4, *a5, *a6, *a7]) * f64x4::from([*b4, *b5, *b6, *b7]);
     }
-    lanes.iter().sum::<f64>() + rest
+    low.to_array().iter().chain(&high.to_array()).sum::<f64>() + rest
 }
 
 /// JᵀWJ and JᵀWr.
