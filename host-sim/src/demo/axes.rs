@@ -13,7 +13,7 @@ use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 use crate::lockstep::{Frame, Recording, Setup};
-use crate::plant::PERIOD_S;
+use crate::plant::{PERIOD_S, PERIODS_PER_S};
 use crate::report::{Role, Table};
 use crate::studies::patch_crossing;
 use crate::studies::speed_sweep::BELL;
@@ -51,11 +51,10 @@ fn row(statement: &str, reproduced: &str, found: String, command: &str) -> Vec<S
 }
 
 /// A figure once with each of these changes to the assumed rig.
-fn summaries(figure: &str, changed: &[Vec<(&str, f64)>]) -> Result<Vec<Summary>, InputError> {
+fn summaries<const N: usize>(figure: &str, changed: &[[(&str, f64); N]]) -> Result<Vec<Summary>, InputError> {
     let (experiment, model) = (ExperimentFile::named_or_read(figure, &[])?, ModelFile::assumed(&[])?);
-    let one = |changes: &Vec<(&str, f64)>| {
-        let changes: Vec<(String, String)> =
-            changes.iter().map(|(key, value)| ((*key).to_string(), format!("{value:?}"))).collect();
+    let one = |changes: &[(&str, f64); N]| {
+        let changes = changes.map(|(key, value)| (key.to_string(), format!("{value:?}")));
         let setup = Setup::from_files(&experiment, &RigFile::assumed_rig(&changes)?, &model, &model)?;
         Ok(ClosedLoop::run(&experiment, &setup, |_, _| {})?.summary)
     };
@@ -117,7 +116,8 @@ fn step_row(run: &ClosedLoop) -> Vec<String> {
 /// Peak over the mean of the last second, less one, after the load step.
 fn overshoot(recording: &Recording, signal: impl Fn(&Frame) -> f64) -> f64 {
     let after = &recording.frames[(LOAD_STEP_S / PERIOD_S) as usize..];
-    let settled = after[after.len() - 10_000..].iter().map(&signal).sum::<f64>() / 1e4;
+    let settled =
+        after[after.len() - PERIODS_PER_S..].iter().map(&signal).sum::<f64>() / PERIODS_PER_S as f64;
     after.iter().map(&signal).fold(0.0, f64::max) / settled - 1.0
 }
 
@@ -145,8 +145,8 @@ fn press_mode_row() -> Result<Vec<String>, InputError> {
     let mut all = true;
     for figure in ["fig18", "fig19", "fig20"] {
         let mut fails = Vec::new();
-        let changed = PRESS_MODES_HZ.map(|mode_hz| vec![("pressure.mode_hz", mode_hz)]);
-        for (mode_hz, s) in PRESS_MODES_HZ.iter().zip(summaries(figure, &changed)?) {
+        let changed = PRESS_MODES_HZ.map(|mode_hz| [("pressure.mode_hz", mode_hz)]);
+        for ([(_, mode_hz)], s) in changed.iter().zip(summaries(figure, &changed)?) {
             let after = s.friction_peak_time_s.zip(s.normal_settled_time_s).is_some_and(|(f, n)| f > n);
             if !after {
                 fails.push(format!("{mode_hz:.0}"));
@@ -175,15 +175,12 @@ fn press_mode_row() -> Result<Vec<String>, InputError> {
 fn later_load_row() -> Result<Vec<String>, InputError> {
     let mut each = Vec::new();
     let mut holds = false;
-    let modes: Vec<(f64, f64)> = PRESS_MODES_HZ
-        .iter()
-        .flat_map(|mode_hz| PRESS_DAMPING_RATIOS.map(|damping| (*mode_hz, damping)))
-        .collect();
-    let changed: Vec<_> = modes
-        .iter()
-        .map(|(mode_hz, damping)| vec![("pressure.mode_hz", *mode_hz), ("pressure.damping_ratio", *damping)])
-        .collect();
-    for ((mode_hz, damping), summary) in modes.iter().zip(summaries("fig21", &changed)?) {
+    let damped = |mode_hz| {
+        PRESS_DAMPING_RATIOS
+            .map(|damping| [("pressure.mode_hz", mode_hz), ("pressure.damping_ratio", damping)])
+    };
+    let changed = PRESS_MODES_HZ.map(damped).concat();
+    for ([(_, mode_hz), (_, damping)], summary) in changed.iter().zip(summaries("fig21", &changed)?) {
         if let Some(later) = summary.friction_ratio_at_same_normal {
             holds |= later < 0.95;
             each.push(format!("{mode_hz:.0} Hz, {damping}: {later:.2}"));
@@ -206,7 +203,7 @@ fn later_load_row() -> Result<Vec<String>, InputError> {
 }
 
 fn preload_row() -> Result<Vec<String>, InputError> {
-    let changed = [4.0, 8.0].map(|preload_n| vec![("pressure.preload_n", preload_n)]);
+    let changed = [4.0, 8.0].map(|preload_n| [("pressure.preload_n", preload_n)]);
     let settled: Vec<f64> =
         summaries("fig18", &changed)?.iter().map(|s| s.normal_settled_n.unwrap_or(0.0)).collect();
     let (soft, hard) = (settled[0], settled[1]);

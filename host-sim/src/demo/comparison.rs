@@ -5,7 +5,7 @@ use super::runs::ClosedLoop;
 use crate::files::experiment_file::{Course, ExperimentFile, Quantity, Study};
 use crate::input_error::InputError;
 use crate::lockstep::Setup;
-use crate::plant::PERIOD_S;
+use crate::plant::{PERIOD_S, PERIODS_PER_S};
 use crate::report::Role;
 use crate::studies::candidate_models::{CandidateModel, constant_overshoot, drive, five};
 use model_core::friction::series::SeriesParameters;
@@ -116,7 +116,7 @@ impl Comparison {
 fn overshoot(torque_nm: &[f64]) -> f64 {
     let from = ((LOAD_STEP_S / PERIOD_S) as usize).min(torque_nm.len());
     let peak = torque_nm[from..].iter().copied().fold(0.0, f64::max);
-    let last = &torque_nm[torque_nm.len() - torque_nm.len().min((1.0 / PERIOD_S) as usize)..];
+    let last = &torque_nm[torque_nm.len() - torque_nm.len().min(PERIODS_PER_S)..];
     let settled = last.iter().sum::<f64>() / last.len() as f64;
     peak / settled - 1.0
 }

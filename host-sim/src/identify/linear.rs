@@ -127,6 +127,19 @@ pub fn normal_equations(j: &[Vec<f64>], w: &[f64], r: &[f64]) -> (DMatrix<f64>, 
 mod tests {
     use super::*;
 
+    /// Rounding shows in what order is summed: eight lanes, then these in turn, then what is left over.
+    #[test]
+    fn a_sum_of_products_is_summed_in_the_order_that_is_promised() {
+        for length in [0, 5, 8, 1003] {
+            let a: Vec<f64> = (0..length).map(|i| (f64::from(i) * 1.7).sin() * 1e3).collect();
+            let b: Vec<f64> = (0..length).map(|i| 1.0 / (1.0 + f64::from(i))).collect();
+            let whole = a.len() / 8 * 8;
+            let lane = |lane: usize| (lane..whole).step_by(8).map(|i| a[i] * b[i]).sum::<f64>();
+            let rest: f64 = (whole..a.len()).map(|i| a[i] * b[i]).sum();
+            assert_eq!(dot(&a, &b), (0..8).map(lane).sum::<f64>() + rest, "{length}");
+        }
+    }
+
     #[test]
     fn a_bound_that_binds_holds_and_the_others_move() {
         let h = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0]);
