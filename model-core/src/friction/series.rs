@@ -96,6 +96,8 @@ pub struct SeriesState<T, const N: usize = 0> {
     pub last_step_s: T,
     /// Forces of the Maxwell branches, N.
     pub branch_n: [T; N],
+    /// (g, v·g′) at the tip speed, where the last step knows it: the next step's search begins there.
+    pub tip_curve: Option<(T, T)>,
 }
 
 impl<T: Real, const N: usize> Default for SeriesState<T, N> {
@@ -109,6 +111,7 @@ impl<T: Real, const N: usize> Default for SeriesState<T, N> {
             mean_root_speed_m_s: T::ZERO,
             last_step_s: T::ZERO,
             branch_n: [T::ZERO; N],
+            tip_curve: None,
         }
     }
 }
@@ -119,6 +122,8 @@ struct Balance<T> {
     slope: T,
     deflection_m: T,
     bristle_force_n: T,
+    /// (g, v·g′)
+    curve: (T, T),
 }
 
 /// The load side of one step, constant while v is searched.
@@ -229,7 +234,13 @@ impl<T: Real, const N: usize> Series<T, N> {
     /// φ(v): bristle force minus block force, its slope, and the bristles' state at that v.
     #[inline]
     fn balance(&self, z: T, load: &Load<T>, v: T) -> Balance<T> {
-        let (g, v_slope) = self.lugre.stribeck.coefficient_and_slope(v);
+        self.balance_on(self.lugre.stribeck.coefficient_and_slope(v), z, load, v)
+    }
+
+    /// As [`Self::balance`] with the curve's value and slope at v known.
+    #[inline]
+    fn balance_on(&self, curve: (T, T), z: T, load: &Load<T>, v: T) -> Balance<T> {
+        let (g, v_slope) = curve;
         let inverse_g = T::ONE / g;
         let rate_per_speed = load.stiffness_rate * inverse_g;
         // (1 + m)(z⁺ − z) − m (last z⁺ − z) = Δt (v − rate |v| z⁺), with vλ′ = λ (1 − v g′/g).
@@ -244,6 +255,7 @@ impl<T: Real, const N: usize> Series<T, N> {
             slope: (self.lugre.sigma0 + self.sigma1_per_step) * slope + load.viscous + load.impedance,
             deflection_m,
             bristle_force_n,
+            curve,
         }
     }
 
@@ -267,9 +279,9 @@ impl<T: Real, const N: usize> Series<T, N> {
         for (branch, force_n) in self.branches.iter().zip(&state.branch_n) {
             drive_n += branch.decay * *force_n + branch.gain * (v_root - left);
         }
-        let (v, deflection_m, force_n) = if load_n <= T::ZERO {
+        let (v, deflection_m, force_n, tip_curve) = if load_n <= T::ZERO {
             // Off the road the block relaxes: k_u u + c_u u̇ = 0.
-            (drive_n * weights.inverse_impedance, T::ZERO, T::ZERO)
+            (drive_n * weights.inverse_impedance, T::ZERO, T::ZERO, None)
         } else {
             let lead = T::ONE + weights.memory;
             let reach_m = load_n * self.lugre.inverse_sigma0;
@@ -290,7 +302,7 @@ impl<T: Real, const N: usize> Series<T, N> {
                 carried_m,
             };
             let (v, balance) = self.solve(state, &load);
-            (v, balance.deflection_m, balance.bristle_force_n)
+            (v, balance.deflection_m, balance.bristle_force_n, Some(balance.curve))
         };
         let mut branch_n = state.branch_n;
         for (branch, force_n) in self.branches.iter().zip(&mut branch_n) {
@@ -306,6 +318,7 @@ impl<T: Real, const N: usize> Series<T, N> {
             mean_root_speed_m_s: v_root,
             last_step_s: step_s,
             branch_n,
+            tip_curve,
         };
         FrictionForce { force_n, tip_speed_m_s: v }
     }
@@ -323,7 +336,10 @@ impl<T: Real, const N: usize> Series<T, N> {
         let resting_m = load.carried_m / load.lead;
         let at_rest = self.lugre.sigma0 * resting_m + self.sigma1_per_step * (resting_m - z) - load.drive_n;
         let mut v = state.tip_speed_m_s;
-        let mut at = self.balance(z, load, v);
+        let curve = state.tip_curve.unwrap_or_else(|| self.lugre.stribeck.coefficient_and_slope(v));
+        // A state belongs to the element that stepped it.
+        debug_assert!(curve == self.lugre.stribeck.coefficient_and_slope(v));
+        let mut at = self.balance_on(curve, z, load, v);
         if at.value.abs() <= tolerance {
             return (v, at);
         }
