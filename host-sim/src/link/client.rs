@@ -15,6 +15,16 @@ pub struct Client {
     incoming: VecDeque<Message>,
     outgoing: Vec<u8>,
     next_id: u16,
+    in_step: InStep,
+}
+
+/// Whoever opens a line on which the rig is sending hears the end of a frame first: that one is not damaged.
+#[derive(Debug, Default, PartialEq)]
+enum InStep {
+    #[default]
+    NoFrameYet,
+    AfterATail,
+    FromTheStart,
 }
 
 impl Client {
@@ -27,9 +37,11 @@ impl Client {
     /// Takes bytes from the rig.
     pub fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            if let Some(Ok(message)) = self.receiver.push(*byte) {
-                self.incoming.push_back(message);
+            let Some(frame) = self.receiver.push(*byte) else { continue };
+            if self.in_step == InStep::NoFrameYet {
+                self.in_step = if frame.is_ok() { InStep::FromTheStart } else { InStep::AfterATail };
             }
+            self.incoming.extend(frame.ok());
         }
     }
 
@@ -55,9 +67,31 @@ impl Client {
         std::mem::take(&mut self.outgoing)
     }
 
-    /// Frames that came in damaged.
+    /// Frames that came in damaged, but for a first one of which only the end was heard.
     #[must_use]
     pub fn frames_rejected(&self) -> u32 {
-        self.receiver.rejected()
+        self.receiver.rejected() - u32::from(self.in_step == InStep::AfterATail)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rig_link::message::Answer;
+
+    #[test]
+    fn the_end_of_a_frame_that_began_before_the_port_was_open_is_not_damaged_and_later_damage_is_counted() {
+        let mut buffer = [0; MAX_FRAME];
+        let length = encode(&Message::Answer { id: 3, answer: Answer::Done }, &mut buffer).unwrap();
+        let frame = &buffer[..length];
+        for first in [&frame[2..], frame] {
+            let mut client = Client::new();
+            client.receive(first);
+            assert_eq!(client.frames_rejected(), 0);
+            client.receive(frame);
+            assert!(client.next_message().is_some());
+            client.receive(&frame[2..]);
+            assert_eq!(client.frames_rejected(), 1);
+        }
     }
 }
