@@ -69,6 +69,7 @@ impl Port {
     }
 
     /// The same without a word on stderr: the procedure shows its notes itself.
+    #[cfg(feature = "screen")]
     pub(super) fn perform_quietly<P: Procedure>(
         &mut self,
         procedure: &mut P,
@@ -83,6 +84,7 @@ impl Port {
     }
 
     /// The port's name.
+    #[cfg(feature = "screen")]
     pub(super) fn name(&self) -> String {
         self.serial.name()
     }

@@ -66,6 +66,9 @@ fn root() -> PathBuf {
 fn host(run: &mut Runner) {
     run.cargo("format", ".", &["fmt", "--all", "--check"]);
     run.cargo("lints", ".", &["clippy", "--quiet", "--all-targets", "--", "-D", "warnings"]);
+    let demo =
+        ["clippy", "--quiet", "--package", "host-sim", "--no-default-features", "--", "-D", "warnings"];
+    run.cargo("lints as for the demo", ".", &demo);
     run.cargo_env("docs", ".", &["doc", "--quiet", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")]);
     run.cargo("host suite", ".", &["test", "--no-fail-fast"]);
     // What takes too long for every change: tests in modules of that name.

@@ -1,10 +1,15 @@
 //! `rig monitor`: what the rig does, as plots on the terminal or as lines.
 
+// What only the screen reads is still kept without it.
+#![cfg_attr(not(feature = "screen"), allow(dead_code))]
+
 mod history;
 mod plain;
+#[cfg(feature = "screen")]
 mod screen;
 mod timing;
 
+#[cfg(feature = "screen")]
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
@@ -15,6 +20,7 @@ use crate::link::client::Client;
 use crate::link::procedure::Procedure;
 use crate::link::record::{Record, Recorded};
 use history::History;
+#[cfg(feature = "screen")]
 use screen::Screen;
 
 /// Show what the rig does: live plots on the terminal, or lines
@@ -106,9 +112,15 @@ impl Monitor {
             return Err(error.allowed("0.5 to 3600, in seconds"));
         }
         interrupt::count_signals();
-        if self.plain || !std::io::stdout().is_terminal() {
-            return plain::watch(&self);
+        #[cfg(feature = "screen")]
+        if !self.plain && std::io::stdout().is_terminal() {
+            return self.draw();
         }
+        plain::watch(&self)
+    }
+
+    #[cfg(feature = "screen")]
+    fn draw(self) -> Result<(), InputError> {
         let (port, listens) = self.port.open_or_listen()?;
         let mut screen = Screen::open(&port.name())?;
         let mut watching = Watching::new(self.span);
