@@ -1,7 +1,7 @@
 //! Logs of a driven rig with a known friction law, by classical Runge–Kutta steps of 2 µs.
 //!
 //! Disc: J ω̇ = τ − F r − c ω, with τ from a speed controller (proportional, integral, limited).
-//! Press: ẍ + 2ζω ẋ + ω² x = ω² F_wanted, load N = max(x, 0).
+//! Normal-load actuator: ẍ + 2ζω ẋ + ω² x = ω² F_wanted, load N = max(x, 0).
 //! Laws (δ = 1/2 throughout, g(v) = a0 + a1 exp(−√(|v|/v0))):
 //! LuGre ż = v − s|v|z/(N g(v)), F = s z; modified: the same with g at the slip v − ż, F = s z;
 //! series: block (k, c) before LuGre bristles, F = s z.
@@ -70,7 +70,7 @@ pub struct Sample {
 pub const RADIUS: f64 = 0.05;
 const INERTIA: f64 = 0.015;
 const VISCOUS: f64 = 0.004;
-const PRESS: (f64, f64) = (100.0, 0.3);
+const ACTUATOR: (f64, f64) = (100.0, 0.3);
 const STEP: f64 = 2e-6;
 
 /// The wanted speed (rad/s) and load (N) over time: a start under light load, a load step, a faster
@@ -112,9 +112,9 @@ impl Rig {
         let force = self.friction(y);
         let motor = Self::motor(y, target);
         d[0] = (motor - force * RADIUS - VISCOUS * y[0]) / INERTIA;
-        let w = std::f64::consts::TAU * PRESS.0;
+        let w = std::f64::consts::TAU * ACTUATOR.0;
         d[1] = y[2];
-        d[2] = w * w * (pressed - y[1]) - 2.0 * PRESS.1 * w * y[2];
+        d[2] = w * w * (pressed - y[1]) - 2.0 * ACTUATOR.1 * w * y[2];
         let (load, v) = (y[1].max(1e-9), y[0] * RADIUS);
         match self.law {
             Law::Lugre { s } => d[3] = v - s * v.abs() * y[3] / (load * self.curve.at(v)),

@@ -158,7 +158,7 @@ fn tell(summary: &Summary) {
     }
 }
 
-/// The original rig: no press, no rubber, and so neither model nor core.
+/// The original rig: no normal-load actuator, no rubber, and so neither model nor core.
 fn two_motors_run(
     experiment: &ExperimentFile,
     segments: [&[Segment]; 2],

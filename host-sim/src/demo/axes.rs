@@ -21,9 +21,9 @@ use crate::summary::Summary;
 use model_core::friction::static_curve::Bell;
 
 /// Natural frequencies of the normal force that are tried; the assumed one is 120 Hz.
-const PRESS_MODES_HZ: [f64; 6] = [20.0, 40.0, 60.0, 90.0, 120.0, 200.0];
+const LOAD_MODES_HZ: [f64; 6] = [20.0, 40.0, 60.0, 90.0, 120.0, 200.0];
 /// Damping ratios of that mode that are tried with it; the assumed one is 0.25.
-const PRESS_DAMPING_RATIOS: [f64; 4] = [0.1, 0.25, 0.5, 0.8];
+const LOAD_DAMPING_RATIOS: [f64; 4] = [0.1, 0.25, 0.5, 0.8];
 /// When the load steps in Figs. 18–21, s.
 const LOAD_STEP_S: f64 = 4.0;
 
@@ -36,7 +36,7 @@ pub(super) fn table(runs: &Runs) -> Result<Table, InputError> {
     rows.extend(runs.named("fig22").map(loop_row));
     rows.extend(runs.named("fig23").map(step_row));
     rows.push(channel_row(runs));
-    rows.push(press_mode_row()?);
+    rows.push(load_mode_row()?);
     rows.push(later_load_row()?);
     rows.push(preload_row()?);
     rows.push(crossing_row(runs)?);
@@ -140,12 +140,12 @@ fn channel_row(runs: &Runs) -> Vec<String> {
 }
 
 /// Whether friction peaks after the normal force has settled, over the assumed mode of the normal-load actuator.
-fn press_mode_row() -> Result<Vec<String>, InputError> {
+fn load_mode_row() -> Result<Vec<String>, InputError> {
     let mut each = Vec::new();
     let mut all = true;
     for figure in ["fig18", "fig19", "fig20"] {
         let mut fails = Vec::new();
-        let changed = PRESS_MODES_HZ.map(|mode_hz| [("pressure.mode_hz", mode_hz)]);
+        let changed = LOAD_MODES_HZ.map(|mode_hz| [("pressure.mode_hz", mode_hz)]);
         for ([(_, mode_hz)], s) in changed.iter().zip(summaries(figure, &changed)?) {
             let after = s.friction_peak_time_s.zip(s.normal_settled_time_s).is_some_and(|(f, n)| f > n);
             if !after {
@@ -164,7 +164,7 @@ fn press_mode_row() -> Result<Vec<String>, InputError> {
         "At 10–30 rpm friction peaks after the normal force has settled (Figs. 18–20).",
         if all { "yes" } else { "only if the normal force is fast" },
         format!(
-            "With a mode of the normal force at {PRESS_MODES_HZ:?} Hz (assumed 120): {}.",
+            "With a mode of the normal force at {LOAD_MODES_HZ:?} Hz (assumed 120): {}.",
             each.join("; ")
         ),
         "cargo rig simulate --experiment fig20 --set rig.pressure.mode_hz=60.0 --out run",
@@ -176,10 +176,10 @@ fn later_load_row() -> Result<Vec<String>, InputError> {
     let mut each = Vec::new();
     let mut holds = false;
     let damped = |mode_hz| {
-        PRESS_DAMPING_RATIOS
+        LOAD_DAMPING_RATIOS
             .map(|damping| [("pressure.mode_hz", mode_hz), ("pressure.damping_ratio", damping)])
     };
-    let changed = PRESS_MODES_HZ.map(damped).concat();
+    let changed = LOAD_MODES_HZ.map(damped).concat();
     for ([(_, mode_hz), (_, damping)], summary) in changed.iter().zip(summaries("fig21", &changed)?) {
         if let Some(later) = summary.friction_ratio_at_same_normal {
             holds |= later < 0.95;

@@ -11,7 +11,7 @@ impl ExperimentFile {
     pub fn for_core(&self, rig: &RigFile) -> Result<Experiment, InputError> {
         let Study::ClosedLoop { m1, m2 } = &self.study else {
             let why = match &self.study {
-                Study::TwoMotors { .. } => "is for the original rig, which has no press",
+                Study::TwoMotors { .. } => "is for the original rig, which has no normal-load actuator",
                 _ => "needs no motors and cannot be run on a rig",
             };
             return Err(InputError::new(why).file(self.source.as_str()).key("kind").allowed("closed_loop"));

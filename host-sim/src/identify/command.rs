@@ -36,7 +36,7 @@ pub fn diagnose(
     rig: &RigFile,
     model: &ModelFile,
     wall_s: &dyn Fn() -> f64,
-    told: &(dyn Fn(&str) + Sync),
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Written, InputError> {
     for log in holdout {
         if let Some(same) = train.iter().find(|t| t.columns == log.columns) {
@@ -52,13 +52,13 @@ pub fn diagnose(
         notes.push(format!("no log is held out: the last {:.0} % of each log are", 100.0 * HELD_OUT_SHARE));
     }
     let (train, holdout) = (&parts.0, &parts.1);
-    let mut judgement = judge(train, rig, model, told)?;
+    let mut judgement = judge(train, rig, model, progress)?;
     judgement.notes.splice(0..0, notes);
-    told("held-out logs");
+    progress("held-out logs");
     let on_train = holdout::errors(&judgement, train, rig, true)?;
     let on_holdout = holdout::errors(&judgement, holdout, rig, false)?;
     let mut values = Values::new();
-    for (part, linear) in [(Part::Drive, &judgement.drive), (Part::Pressure, &judgement.press)] {
+    for (part, linear) in [(Part::Drive, &judgement.drive), (Part::Pressure, &judgement.normal_load)] {
         if let (Some(linear), Some(place)) = (linear, judgement.place(part)) {
             values.extend(extended_model::linear_values(linear, place));
         }
@@ -66,7 +66,7 @@ pub fn diagnose(
     extended_model::add_amplitudes(&mut values);
     let text = match &judgement.contact {
         Some(contact) => {
-            told("extended model");
+            progress("extended model");
             let place = judgement.place(Part::Friction).unwrap_or(0);
             let extended = extended_model::contact(contact, place, model)?;
             values.extend(extended.values);

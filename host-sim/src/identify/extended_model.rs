@@ -238,7 +238,7 @@ pub fn drive_text(found: &Judgement) -> String {
 /// What was found outside the contact, as comments of its file.
 pub fn remarks(found: &Judgement) -> String {
     let mut text = String::new();
-    for (part, linear) in [(Part::Drive, &found.drive), (Part::Pressure, &found.press)] {
+    for (part, linear) in [(Part::Drive, &found.drive), (Part::Pressure, &found.normal_load)] {
         let (Some(linear), Some(place)) = (linear, found.place(part)) else { continue };
         for (id, values) in linear_values(linear, place) {
             text += &format!(

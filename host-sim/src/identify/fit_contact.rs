@@ -107,10 +107,10 @@ fn starts(baseline: &Baseline) -> Vec<Vec<f64>> {
 }
 
 /// Gauss–Newton with fresh slopes until it gains nothing.
-fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, told: &(dyn Fn() + Sync)) -> Fit {
+fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, progress: &(dyn Fn() + Sync)) -> Fit {
     let mut best = problem.fit(&[], start, STEPS, None);
     for _ in 1..rounds {
-        told();
+        progress();
         let next = problem.fit(&[], best.p.clone(), STEPS, None);
         let gained = best.cost - next.cost;
         best = next;
@@ -121,7 +121,7 @@ fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, told: &(dyn 
     best
 }
 
-/// Identifies the parameters `free` of `model` from logs. `told` hears of every round of the search.
+/// Identifies the parameters `free` of `model` from logs. `progress` hears of every round of the search.
 ///
 /// # Errors
 /// Logs without the columns; parameters that are unknown, that these logs do not show, or that they cannot part.
@@ -130,7 +130,7 @@ pub fn identify(
     rig: &RigFile,
     logs: &[Log],
     free: &[String],
-    told: &(dyn Fn() + Sync),
+    progress: &(dyn Fn() + Sync),
 ) -> Result<ContactFit, InputError> {
     let refuse = |why: FitError| InputError::new(why.to_string()).file(model.source.as_str());
     let baseline = baseline_of(model, free)?;
@@ -145,7 +145,7 @@ pub fn identify(
     examined(&problem, &starts[0], &problem.residuals(&[], &starts[0])).map_err(refuse)?;
 
     let mut found: Vec<Fit> =
-        starts.into_par_iter().map(|start| converged(&problem, start, FIRST_ROUNDS, told)).collect();
+        starts.into_par_iter().map(|start| converged(&problem, start, FIRST_ROUNDS, progress)).collect();
     found.retain(|fit| fit.cost.is_finite());
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let Some(best) = found.first() else { return Err(refuse(FitError::NotFinite)) };
@@ -155,10 +155,10 @@ pub fn identify(
     let mut there = baseline.clone();
     there.free.iter_mut().zip(&best.p).for_each(|(base, p)| base.parameter.mean = *p);
     problem.noise = Problem::new(&logs, &there, &[]).noise;
-    let mut fit = converged(&problem, best.p.clone(), ROUNDS, told);
+    let mut fit = converged(&problem, best.p.clone(), ROUNDS, progress);
     for _ in 0..2 {
         problem.noise.refit(&logs, &fit.r);
-        fit = converged(&problem, fit.p.clone(), ROUNDS, told);
+        fit = converged(&problem, fit.p.clone(), ROUNDS, progress);
     }
     let singular_ratio = examined(&problem, &fit.p, &fit.r).map_err(refuse)?;
 

@@ -8,9 +8,9 @@ use super::balance::{Alternative, Balance};
 use super::contact::log::ContactLog;
 use super::contact::problem::Problem;
 use super::drive::{self, DriveLog, DriveScales};
-use super::effects::{DriveView, LIBRARY, PressView};
+use super::effects::{DriveView, LIBRARY, NormalLoadView};
 use super::judge::{self, ContactPart, Judgement, Linear, Part};
-use super::press::{self, PressLog, PressScales};
+use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
@@ -115,10 +115,13 @@ pub fn errors(
         if let (Some(drive), Some(drives)) = (&found.drive, drives) {
             out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), training)));
         }
-        let presses: Option<Vec<PressLog>> = prepared.iter().map(PressLog::new).collect();
-        if let (Some(press), Some(presses)) = (&found.press, presses) {
+        let load_logs: Option<Vec<NormalLoadLog>> = prepared.iter().map(NormalLoadLog::new).collect();
+        if let (Some(normal_load), Some(load_logs)) = (&found.normal_load, load_logs) {
             let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
-            out.push((Part::Pressure, press_errors(found, press, &presses, &names, rig, training)));
+            out.push((
+                Part::Pressure,
+                normal_load_errors(found, normal_load, &load_logs, &names, rig, training),
+            ));
         }
     } else if let Some(drive) = &found.drive {
         // Through the filter of the training logs.
@@ -289,10 +292,10 @@ fn drive_errors(
     linear_errors(&names, &balance, &base, &extended, balance.row_step_s)
 }
 
-fn press_errors(
+fn normal_load_errors(
     found: &Judgement,
     part: &Linear,
-    logs: &[PressLog],
+    logs: &[NormalLoadLog],
     names: &[String],
     rig: &RigFile,
     training: bool,
@@ -308,21 +311,21 @@ fn press_errors(
             part.balance.row_step_s,
         );
     }
-    let own_scales = PressScales::new(logs);
-    let scales = part.press_scales.as_ref().unwrap_or(&own_scales);
-    let balance = press::balance(logs, rig, scales);
+    let own_scales = NormalLoadScales::new(logs);
+    let scales = part.normal_load_scales.as_ref().unwrap_or(&own_scales);
+    let balance = normal_load::balance(logs, rig, scales);
     let solved = &part.solved[place];
     let mut fixed = Vec::new();
     for chosen in &solved.set {
         let own = &part.alternatives[*chosen];
-        let view = PressView {
+        let view = NormalLoadView {
             logs,
             scales,
             balance: &balance,
             residual: &balance.response,
             fixed: Some(&own.constants),
         };
-        fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.press(&view)));
+        fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.normal_load(&view)));
     }
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
     linear_errors(names, &balance, &base, &extended, balance.row_step_s)

@@ -1,4 +1,4 @@
-//! The diagnosis: contact, drive and press searched, one table over what they found, and what is left.
+//! The diagnosis: contact, drive and normal-load actuator searched, one table over what they found, and what is left.
 //!
 //! A hypothesis is a set of effects. Each effect enters every balance that it touches; the evidence of a set is the sum
 //! over the balances, each with the best of its sets that has no other effect. So a sensor's fault that the contact could
@@ -13,8 +13,8 @@ use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
-use super::effects::{ContactView, DriveView, LIBRARY, PressView};
-use super::press::{self, PressLog, PressScales};
+use super::effects::{ContactView, DriveView, LIBRARY, NormalLoadView};
+use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Rest};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
@@ -87,8 +87,8 @@ pub struct Linear {
     pub signal: f64,
     /// Scales of the drive's columns.
     pub drive_scales: Option<DriveScales>,
-    /// Scales of the press's columns.
-    pub press_scales: Option<PressScales>,
+    /// Scales of the normal-load actuator's columns.
+    pub normal_load_scales: Option<NormalLoadScales>,
 }
 
 /// The contact, searched.
@@ -180,7 +180,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
     let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.drive(&view)).collect();
     let solved = balance::search(&mut balance, &alternatives, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
-    Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), press_scales: None }
+    Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), normal_load_scales: None }
 }
 
 /// Inertia or mass by a first balance through the widest filter: it says how narrow the filter may be.
@@ -194,16 +194,18 @@ fn drive_inertia(logs: &[Log]) -> Result<f64, InputError> {
     Ok(balance.solve(&[], &[]).p[drive::INERTIA].max(0.0))
 }
 
-/// The press's balance of these logs, searched.
-pub fn search_press(logs: &[PressLog], rig: &RigFile) -> Linear {
-    let scales = PressScales::new(logs);
-    let mut balance = press::balance(logs, rig, &scales);
+/// The normal-load actuator's balance of these logs, searched.
+pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
+    let scales = NormalLoadScales::new(logs);
+    let mut balance = normal_load::balance(logs, rig, &scales);
     let base = balance.solve(&[], &[]);
-    let view = PressView { logs, scales: &scales, balance: &balance, residual: &base.residual, fixed: None };
-    let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.press(&view)).collect();
+    let view =
+        NormalLoadView { logs, scales: &scales, balance: &balance, residual: &base.residual, fixed: None };
+    let alternatives: Vec<Alternative> =
+        LIBRARY.iter().flat_map(|effect| effect.normal_load(&view)).collect();
     let solved = balance::search(&mut balance, &alternatives, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
-    Linear { balance, alternatives, solved, signal, drive_scales: None, press_scales: Some(scales) }
+    Linear { balance, alternatives, solved, signal, drive_scales: None, normal_load_scales: Some(scales) }
 }
 
 impl Linear {
@@ -303,8 +305,8 @@ pub struct Judgement {
     pub contact: Option<ContactPart>,
     /// The drive, where its torque is logged.
     pub drive: Option<Linear>,
-    /// The press, where its torque is logged.
-    pub press: Option<Linear>,
+    /// The normal-load actuator, where its torque is logged.
+    pub normal_load: Option<Linear>,
     /// All hypotheses compared, the answer first.
     pub hypotheses: Vec<Hypothesis>,
     /// Effects that a balance asked for but that change too little.
@@ -332,7 +334,7 @@ pub fn judge(
     train: &[Log],
     rig: &RigFile,
     model: &ModelFile,
-    told: &(dyn Fn(&str) + Sync),
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Judgement, InputError> {
     let kinds = train.iter().map(Log::kind).collect::<Result<Vec<_>, _>>()?;
     if kinds.windows(2).any(|k| k[0] != k[1]) {
@@ -341,7 +343,7 @@ pub fn judge(
             .allowed("contact logs, or drive logs"));
     }
     let mut notes = Vec::new();
-    let (mut contact, mut press) = (None, None);
+    let (mut contact, mut normal_load) = (None, None);
     let mut drive;
     let linear_stage = kinds.first() == Some(&LogKind::LinearDrive);
     if kinds.first() == Some(&LogKind::Contact) {
@@ -351,7 +353,7 @@ pub fn judge(
                 logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
             drives.map(|drives| search_drive(&drives, &drive_prior(rig), true))
         };
-        told("drive");
+        progress("drive");
         drive = of_drive(&logs);
         let block = contact_baseline::has_block(model);
         let baseline = contact_baseline::baseline(model, contact_baseline::KNOWN_WITHIN);
@@ -367,18 +369,18 @@ pub fn judge(
         if drive.is_none() {
             notes.push("no torque of M2: the drive is not looked at".to_string());
         }
-        let presses: Option<Vec<PressLog>> = logs.iter().map(PressLog::new).collect();
-        if let Some(presses) = presses {
-            told("press");
-            press = Some(search_press(&presses, rig));
+        let load_logs: Option<Vec<NormalLoadLog>> = logs.iter().map(NormalLoadLog::new).collect();
+        if let Some(load_logs) = load_logs {
+            progress("normal-load actuator");
+            normal_load = Some(search_normal_load(&load_logs, rig));
         } else {
-            notes.push("no torque of M1: the press is not looked at".to_string());
+            notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
         }
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
         let (noise, ranked, sizes, ends) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
-            let found = search::search(&mut problem, told);
+            let found = search::search(&mut problem, progress);
             let sizes = found.ranked.iter().map(|r| search::sizes(&problem, &r.fit)).collect();
             let best = &found.ranked[0].fit;
             let ends = problem.change(&best.terms, &best.p).ends_nm;
@@ -395,14 +397,14 @@ pub fn judge(
     } else {
         let inertia = drive_inertia(train)?;
         let logs = train.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
-        told("drive");
+        progress("drive");
         drive = Some(search_drive(
             &logs,
             &DrivePrior { inertia: None, coulomb: None, viscous: None },
             !linear_stage,
         ));
     }
-    told("table of causes");
+    progress("table of causes");
     let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
     if let Some(contact) = &contact {
         parts.push((Part::Friction, contact_candidates(contact)));
@@ -410,14 +412,14 @@ pub fn judge(
     if let Some(drive) = &drive {
         parts.push((Part::Drive, drive.candidates()));
     }
-    if let Some(press) = &press {
-        parts.push((Part::Pressure, press.candidates()));
+    if let Some(normal_load) = &normal_load {
+        parts.push((Part::Pressure, normal_load.candidates()));
     }
     let (hypotheses, too_small) = table(&parts);
     let mut judgement = Judgement {
         contact,
         drive,
-        press,
+        normal_load,
         hypotheses,
         too_small,
         unknown: 0.0,
@@ -606,7 +608,7 @@ impl Judgement {
             let disc_cause = contact.disc_cause.as_ref().filter(|c| hypothesis.effects.contains(&c.effect));
             out.push((Part::Friction, rest::of_contact(contact, place, disc_cause)));
         }
-        for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.press)] {
+        for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.normal_load)] {
             if let (Some(linear), Some(place)) = (linear, place(part)) {
                 out.push((part, linear.rest(place)));
             }

@@ -231,7 +231,7 @@ fn acting(judged: &Judgement, part: Part) -> Vec<&'static str> {
             contact.fit(place).terms.iter().map(|t| contact.terms[*t].effect).collect()
         }),
         Part::Drive | Part::Pressure => {
-            let linear = if part == Part::Drive { &judged.drive } else { &judged.press };
+            let linear = if part == Part::Drive { &judged.drive } else { &judged.normal_load };
             let effects = |l: &super::judge::Linear| {
                 l.solved[place].set.iter().map(|a| l.alternatives[*a].effect).collect()
             };

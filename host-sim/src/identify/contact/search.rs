@@ -73,9 +73,9 @@ pub struct Found {
 }
 
 /// Searches.
-pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found {
+pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Found {
     let base = baseline(problem);
-    told("single causes");
+    progress("single causes");
     let (singles, known) = singles(problem, &base);
     let mut all: Vec<Fit> = singles.iter().take(FINALISTS).cloned().collect();
     all.push(base.clone());
@@ -86,12 +86,12 @@ pub fn search(problem: &mut Problem<'_>, told: &(dyn Fn(&str) + Sync)) -> Found 
         if !worth {
             break;
         }
-        told(what);
+        progress(what);
         let children = children(problem, &parents, &known);
         parents = children.iter().take(2).cloned().collect();
         all.extend(children.into_iter().take(FINALISTS));
     }
-    told("evidence");
+    progress("evidence");
     let mut ranked = rank(problem, all);
     for _ in 0..2 {
         problem.noise.refit(problem.logs, &ranked[0].fit.r);

@@ -3,7 +3,7 @@
 use model_core::extension::bridge_drift::BridgeDrift as Law;
 
 use super::coordinates::saturating;
-use super::{About, ContactView, DriveView, Effect, PressView};
+use super::{About, ContactView, DriveView, Effect, NormalLoadView};
 use crate::identify::balance::Alternative;
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::term::{Column, Parameter};
@@ -120,10 +120,10 @@ impl Effect for BridgeDrift {
         vec![Alternative::columns(self.id(), parameters, columns)]
     }
 
-    fn press(&self, view: &PressView<'_>) -> Vec<Alternative> {
+    fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let s = view.scales;
         let over_time = |bend: f64, with_load: bool| {
-            let of = |log: &super::PressLog| {
+            let of = |log: &super::NormalLoadLog| {
                 let time: Vec<f64> = log.time_s.iter().map(|t| t / s.time_s).collect();
                 let drift = saturating(&time, 1.0, bend);
                 let load = |i: usize| if with_load { log.filtered_n[i] / s.load_n } else { 1.0 };

@@ -1,6 +1,6 @@
 //! `foil_hardening`: the spring force grows faster than linearly.
 
-use super::{About, Effect, PressView};
+use super::{About, Effect, NormalLoadView};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
 
@@ -16,10 +16,10 @@ impl Effect for FoilHardening {
         }
     }
 
-    fn press(&self, view: &PressView<'_>) -> Vec<Alternative> {
+    fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let s = view.scales;
         let power = |n: i32| {
-            let of = |log: &super::PressLog| log.filtered_n.iter().map(|x| (x.max(0.0) / s.load_n).powi(n)).collect::<Vec<f64>>();
+            let of = |log: &super::NormalLoadLog| log.filtered_n.iter().map(|x| (x.max(0.0) / s.load_n).powi(n)).collect::<Vec<f64>>();
             view.logs.iter().flat_map(of).collect()
         };
         // Up to a bend as sharp as that of a second leaf.

@@ -1,6 +1,6 @@
 //! `lever_hysteresis`: normal force lags M1 torque by a Coulomb band.
 
-use super::{About, Effect, PressView};
+use super::{About, Effect, NormalLoadView};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
 
@@ -34,14 +34,14 @@ impl Effect for LeverHysteresis {
         }
     }
 
-    fn press(&self, view: &PressView<'_>) -> Vec<Alternative> {
+    fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let s = view.scales;
         // The joints yield with the force that they carry, or with the torque before them: the force rings after a step,
         // the torque does not.
-        let over = |form: &str, usual: f64, signal: &dyn Fn(&super::PressLog) -> Vec<f64>| {
+        let over = |form: &str, usual: f64, signal: &dyn Fn(&super::NormalLoadLog) -> Vec<f64>| {
             let column = |share: f64| -> Vec<f64> {
                 let width = share * usual;
-                let of = |log: &super::PressLog| {
+                let of = |log: &super::NormalLoadLog| {
                     let values = signal(log);
                     let follows = play(&values, width);
                     values.iter().zip(follows).map(|(x, q)| (x - q) / width).collect::<Vec<f64>>()

@@ -4,7 +4,7 @@
 //! two are one, and a law over them is a law of the spring force: then nothing parts them. Columns as those of M2's ripple.
 
 use super::waves::{self, Waves};
-use super::{About, Effect, PressView, fixed_orders};
+use super::{About, Effect, NormalLoadView, fixed_orders};
 use crate::identify::balance::Alternative;
 
 /// The effect.
@@ -25,7 +25,7 @@ impl Effect for M1Ripple {
         }
     }
 
-    fn press(&self, view: &PressView<'_>) -> Vec<Alternative> {
+    fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let angle: Option<Vec<&[f64]>> = view.logs.iter().map(|log| log.angle_rad.as_deref()).collect();
         let force: Vec<&[f64]> = view.logs.iter().map(|log| log.filtered_n.as_slice()).collect();
         let mut all = Vec::new();

@@ -8,7 +8,7 @@ use crate::identify::contact::change::{Change, ContactTerm};
 use crate::identify::contact::log::ContactLog;
 use crate::identify::drive::{DriveLog, DriveScales};
 use crate::identify::judge::ContactPart;
-use crate::identify::press::{PressLog, PressScales};
+use crate::identify::normal_load::{NormalLoadLog, NormalLoadScales};
 use coordinates::Coordinates;
 
 /// The logs of a contact, and what the effects' columns are scaled with: always that of the training logs.
@@ -63,12 +63,12 @@ pub(super) fn fixed_orders(fixed: &[(String, f64)]) -> Vec<f64> {
         .collect()
 }
 
-/// The logs of a press, and what columns are made from.
-pub struct PressView<'a> {
+/// The logs of a normal-load actuator, and what columns are made from.
+pub struct NormalLoadView<'a> {
     /// Logs.
-    pub logs: &'a [PressLog],
+    pub logs: &'a [NormalLoadLog],
     /// Usual sizes.
-    pub scales: &'a PressScales,
+    pub scales: &'a NormalLoadScales,
     /// The balance that the columns belong to.
     pub balance: &'a Balance,
     /// What the base leaves of it.
@@ -135,8 +135,8 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Its columns in the press's balance, one entry for each shape.
-    fn press(&self, _view: &PressView<'_>) -> Vec<Alternative> {
+    /// Its columns in the normal-load actuator's balance, one entry for each shape.
+    fn normal_load(&self, _view: &NormalLoadView<'_>) -> Vec<Alternative> {
         Vec::new()
     }
 }

@@ -259,10 +259,10 @@ fn at_an_instant(
     endpoint.branch(jobs, plan.at_once, &mut |which, bytes| {
         let Some(ToDo { nth, case }) = to_do.get(which) else { return Ok(ControlFlow::Continue(())) };
         let run = Run { fault: case.name.clone(), state, at_ns, row: decoded(bytes)? };
-        let told = (runs.tell)(Done { nth: *nth, run: &run })?;
+        let flow = (runs.tell)(Done { nth: *nth, run: &run })?;
         runs.done.insert(*nth, run);
-        runs.ended |= told.is_break();
-        Ok(told)
+        runs.ended |= flow.is_break();
+        Ok(flow)
     })
 }
 

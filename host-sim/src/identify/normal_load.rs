@@ -1,4 +1,4 @@
-//! The press's balance: torque of M1 against normal force, springs and the mechanism's mode.
+//! The normal-load actuator's balance: torque of M1 against normal force, springs and the mechanism's mode.
 //!
 //! T1 = N/G + F0/G + d₁ Ṅ + d₂ N̈ + lateness
 //!
@@ -14,7 +14,7 @@ use crate::files::rig_file::RigFile;
 
 /// Width of the filter, samples.
 pub const WIDTH: f64 = 4.0;
-/// What no model of the press is more accurate than, relative to its torque.
+/// What no model of the normal-load actuator is more accurate than, relative to its torque.
 const LEAST_NOISE: f64 = 5e-4;
 /// Share of the filtered change a sample that is not known.
 const BETWEEN_SAMPLES: f64 = 0.05;
@@ -25,9 +25,9 @@ const TOUCHING: f64 = 0.04;
 /// Gain and preload of the rig file are known within 10 %, the mode's coefficients within half.
 const KNOWN: f64 = 0.1;
 
-/// Signals of the press in a log.
+/// Signals of the normal-load actuator in a log.
 #[derive(Debug, Clone)]
-pub struct PressLog {
+pub struct NormalLoadLog {
     /// Step, s.
     pub step_s: f64,
     /// Torque of M1, N m.
@@ -44,8 +44,8 @@ pub struct PressLog {
     pub usable: Vec<bool>,
 }
 
-impl PressLog {
-    /// The press of a contact log; `None` where M1's torque is not logged.
+impl NormalLoadLog {
+    /// The normal-load actuator of a contact log; `None` where M1's torque is not logged.
     pub fn new(log: &ContactLog) -> Option<Self> {
         Some(Self {
             step_s: log.grid.step_s,
@@ -76,7 +76,7 @@ impl PressLog {
 
 /// Usual sizes over the training logs.
 #[derive(Debug, Clone, Copy)]
-pub struct PressScales {
+pub struct NormalLoadScales {
     /// Normal force, N.
     pub load_n: f64,
     /// Torque, N m.
@@ -85,10 +85,11 @@ pub struct PressScales {
     pub time_s: f64,
 }
 
-impl PressScales {
+impl NormalLoadScales {
     /// Of the training logs.
-    pub fn new(logs: &[PressLog]) -> Self {
-        let usual = |of: &dyn Fn(&PressLog) -> f64| rms(&logs.iter().map(of).collect::<Vec<_>>()).max(1e-12);
+    pub fn new(logs: &[NormalLoadLog]) -> Self {
+        let usual =
+            |of: &dyn Fn(&NormalLoadLog) -> f64| rms(&logs.iter().map(of).collect::<Vec<_>>()).max(1e-12);
         Self {
             load_n: usual(&|log| rms(&log.normal_n)),
             torque_nm: usual(&|log| rms(&log.torque_nm)),
@@ -98,9 +99,9 @@ impl PressScales {
 }
 
 /// The balance of these logs.
-pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balance {
-    let concat = |of: &dyn Fn(&PressLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
-    let derivative = |log: &PressLog, order: usize| -> Vec<f64> {
+pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales) -> Balance {
+    let concat = |of: &dyn Fn(&NormalLoadLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let derivative = |log: &NormalLoadLog, order: usize| -> Vec<f64> {
         let per = log.step_s.powi(order as i32);
         gaussian(&log.normal_n, WIDTH, order).iter().map(|d| d / per).collect()
     };
@@ -119,7 +120,7 @@ pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balanc
                 rig.preload_n / gain,
                 (KNOWN * rig.preload_n / gain).max(0.02 * scales.torque_nm),
             ),
-            vec![1.0; logs.iter().map(PressLog::len).sum()],
+            vec![1.0; logs.iter().map(NormalLoadLog::len).sum()],
         ),
         (
             known("damping_nm_s_per_n", 2.0 * rig.pressure.damping_ratio / omega / gain, 1.0 / omega / gain),
@@ -139,7 +140,7 @@ pub fn balance(logs: &[PressLog], rig: &RigFile, scales: &PressScales) -> Balanc
 }
 
 /// Rows of a log: noise from named sources; lifted off, the stop carries what the springs do not.
-fn rows<'l>(log: &'l PressLog, gain: f64, scales: &PressScales) -> LogRows<'l> {
+fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> LogRows<'l> {
     let change = largest_change(&log.torque_nm, WIDTH);
     let bend =
         local_maximum(&gaussian(&log.normal_n, WIDTH, 2).iter().map(|d| d.abs()).collect::<Vec<_>>(), 4);
