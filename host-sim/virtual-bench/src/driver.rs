@@ -93,6 +93,8 @@ pub(crate) struct BenchDriver {
     patched: Vec<(u64, Width, u64)>,
     /// Code that a fault put in the core's way.
     in_the_way: Option<u64>,
+    /// The crystal fails as the core arrives there: the same code asks for the interrupt that the failure is.
+    crystal_fails: bool,
     lookout: Lookout,
     deviations: Deviations,
     /// Scans spoilt when the operator began to look out.
@@ -143,6 +145,7 @@ impl BenchDriver {
             resets_seen: 0,
             patched: Vec::new(),
             in_the_way: None,
+            crystal_fails: false,
             lookout: Lookout::default(),
             deviations: Deviations::default(),
             spoilt: 0,
@@ -337,7 +340,7 @@ impl BenchDriver {
                 }
             }
             Action::ClockFails => {
-                part.fail_crystal(stop.at);
+                self.crystal_fails = true;
                 self.obstruct(TICK_LINE, Obstacle::ClockFailure, host);
             }
             Action::FlipBit { address, bit } => {
@@ -638,6 +641,9 @@ impl Driver<RigBoard> for BenchDriver {
             }
             Settled::Hit(hit) if hit.kind == HitKind::Instruction => {
                 if self.in_the_way == Some(hit.address) {
+                    if std::mem::take(&mut self.crystal_fails) {
+                        session.board_mut().part.fail_crystal(hit.at);
+                    }
                     self.lookout.arrived(hit.address, hit.at.0);
                 }
                 self.meter.handler_entered(Moment { instructions: hit.instruction_count, nanos: hit.at.0 });
