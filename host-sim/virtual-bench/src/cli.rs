@@ -263,10 +263,13 @@ fn run_faults(cli: &Cli, firmware: &Firmware) -> Result<(), BenchError> {
         output.finish()?;
     }
     let failed = campaign::table::failed(&runs).len();
-    if failed == 0 {
+    let never = campaign::table::never_acted(&runs);
+    if failed > 0 {
+        Err(BenchError::Check(format!("{failed} of {} runs", campaign::table::counted(&runs))))
+    } else if never.is_empty() {
         Ok(())
     } else {
-        Err(BenchError::Check(format!("{failed} of {} runs", campaign::table::counted(&runs))))
+        Err(BenchError::Check(format!("acted in none of their runs: {}", never.join(", "))))
     }
 }
 

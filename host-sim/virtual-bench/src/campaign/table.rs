@@ -37,6 +37,16 @@ pub fn counted(runs: &[Run]) -> usize {
     runs.iter().filter(|run| run.row.seen.is_some()).count()
 }
 
+/// Faults that acted in none of their runs: nothing is known of them.
+#[must_use]
+pub fn never_acted(runs: &[Run]) -> Vec<&str> {
+    let mut names: Vec<&str> = runs.iter().map(|run| run.fault.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.retain(|name| !runs.iter().any(|run| run.fault == *name && run.row.seen.is_some()));
+    names
+}
+
 /// Whether the run counts and something in it was not as it must be.
 #[must_use]
 pub fn has_failed(run: &Run) -> bool {
@@ -102,4 +112,27 @@ pub fn table(runs: &[Run]) -> String {
         failed(runs).len()
     );
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::case::Row;
+
+    #[test]
+    fn a_fault_that_acted_in_none_of_its_states_is_named() {
+        let run = |fault: &str, state, seen: Option<u64>| Run {
+            fault: fault.to_owned(),
+            state,
+            at_ns: 0,
+            row: Row { seen: seen.map(|at| (at, String::new())), ..Row::default() },
+        };
+        let runs = [
+            run("open", State::Idle, None),
+            run("short", State::Idle, None),
+            run("short", State::Armed, Some(1)),
+            run("open", State::Armed, None),
+        ];
+        assert_eq!(never_acted(&runs), ["open"]);
+    }
 }
