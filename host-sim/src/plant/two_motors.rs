@@ -3,8 +3,8 @@
 //! J1 ω̇1 = τ1 + τ_s − b1(ω1),   J2 ω̇2 = τ2 − τ_s − b2(ω2),   τ_s = k·gap(θ2 − θ1) + c (ω2 − ω1) outside the gap
 //!
 //! Bearing, shaft and gap are those of the tribometer's disc (`disc.rs`); the drives have its lag. Inertia discs are
-//! part of J1 or J2. There is no normal-load actuator and no rubber, so the control core, whose M1 presses against springs, has no place
-//! here: both drives are given their torques.
+//! part of J1 or J2. There is no normal-load actuator and no rubber, so the control core, whose M1 presses against springs,
+//! has no place here: both drives are given their torques.
 //!
 //! **Resolver.** Two windings give sin θ and cos θ; the converter behind them takes the angle from both. Where the
 //! amplitude of one is off by the share a, it reads atan2((1 + a) sin θ, cos θ) ≈ θ + (a/2) sin 2θ: twice a turn, where an
