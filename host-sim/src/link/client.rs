@@ -15,16 +15,9 @@ pub struct Client {
     incoming: VecDeque<Message>,
     outgoing: Vec<u8>,
     next_id: u16,
-    in_step: InStep,
-}
-
-/// Whoever opens a line on which the rig is sending hears the end of a frame first: that one is not damaged.
-#[derive(Debug, Default, PartialEq)]
-enum InStep {
-    #[default]
-    NoFrameYet,
-    AfterATail,
-    FromTheStart,
+    /// Whoever opens a line on which the rig is sending hears the end of a frame first, which is not damaged: 1 where the
+    /// first frame was one, 0 where it was whole; none before.
+    tails: Option<u32>,
 }
 
 impl Client {
@@ -38,9 +31,7 @@ impl Client {
     pub fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
             let Some(frame) = self.receiver.push(*byte) else { continue };
-            if self.in_step == InStep::NoFrameYet {
-                self.in_step = if frame.is_ok() { InStep::FromTheStart } else { InStep::AfterATail };
-            }
+            self.tails.get_or_insert(u32::from(frame.is_err()));
             self.incoming.extend(frame.ok());
         }
     }
@@ -70,7 +61,7 @@ impl Client {
     /// Frames that came in damaged, but for a first one of which only the end was heard.
     #[must_use]
     pub fn frames_rejected(&self) -> u32 {
-        self.receiver.rejected() - u32::from(self.in_step == InStep::AfterATail)
+        self.receiver.rejected() - self.tails.unwrap_or(0)
     }
 }
 
