@@ -51,7 +51,8 @@ An experiment writes log.csv (as the host tool recorded it from the serial link)
 capture has it; what the observer's model left unexplained) and defmt.log (the firmware's log, decoded). Time on the bench is instructions: figures in microseconds are not the chip's.
 
 --faults writes each run to faults.jsonl in --out as soon as it is done, and all of them to faults.json at the end. Ctrl-C
-ends it with the table so far; the same command with the same --out then makes the runs that are left.
+ends it with the table so far; the same command with the same --out then makes the runs that are left. It fails where a
+run failed, and where a fault acted in none of its runs: nothing is known of that one.
 
 --serve makes a board of it: the ELF runs in real time, prints the name of its serial port and then its log, and every
 command of rig works on that port as on a board's. The keyboard is what a person would touch at the rig; ? shows the
