@@ -21,6 +21,9 @@ use std::collections::VecDeque;
 
 type Register = <Tim<General> as Device>::Register;
 
+/// Bits of DIER that ask for transfers: UDE, CC1DE to CC4DE, TDE (RM0433 rev 9, TIM2 to TIM5).
+const DMA_REQUESTS: u64 = 0x5F00;
+
 /// One of the two lines of an encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Line {
@@ -321,7 +324,10 @@ impl Device for EncoderTimer {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
-        self.timer.on_request(change, registers, context);
+        // What it would hear is that a transfer it asked for was made.
+        if registers.get(Register::Dier) & DMA_REQUESTS != 0 {
+            self.timer.on_request(change, registers, context);
+        }
     }
 
     fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
