@@ -96,6 +96,8 @@ struct ContactSummary {
     fit: Part,
     /// Of the friction law at the slip observed from the measured force: what was fitted.
     nrmse_by_observed_slip: f64,
+    /// Whether a simulation decided in the end, since it left less than the observed slip.
+    fitted_by_simulation: bool,
     /// Parameters that these logs do not determine within a factor of e; they have no interval.
     undetermined: Vec<String>,
     /// How much later than the rig file says the friction channel is, found beside the parameters.
@@ -232,8 +234,8 @@ impl Fit {
             }
             free.retain(|free| free != name);
         }
-        // Five starts of at most five rounds, then some ten to converge.
-        let bar = Mutex::new(Progress::new("fitting", 35));
+        // Five starts of at most five rounds, some ten to converge, then some twenty steps by simulation.
+        let bar = Mutex::new(Progress::new("fitting", 55));
         let rounds = AtomicU64::new(0);
         let progress = || {
             rounds.fetch_add(1, Ordering::Relaxed);
@@ -353,10 +355,16 @@ fn write_contact(
         100.0 * nrmse,
         100.0 * fit.nrmse_by_observed_slip
     ));
+    if fit.simulated {
+        say(
+            "a simulation of these logs leaves less than the observed slip does: the numbers are those of the simulation",
+        );
+    }
     let summary = ContactSummary {
         kind: fit.model.kind.name(),
         fit: found,
         nrmse_by_observed_slip: fit.nrmse_by_observed_slip,
+        fitted_by_simulation: fit.simulated,
         undetermined,
         channel_late_ms: fit.late_ms,
         singular_ratio: fit.singular_ratio,

@@ -11,7 +11,34 @@ pub fn gaussian(values: &[f64], width: f64, order: usize) -> Vec<f64> {
     if n == 0 || width <= 0.0 {
         return values.to_vec();
     }
-    let kernel = kernel(width, order);
+    convolved(values, &kernel(width, order))
+}
+
+/// Values smoothed with (3 − x²/w²)/2 times a Gaussian of width w (samples), so that polynomials up to the third degree pass
+/// as they are: at ωw = 0.75 it loses 4 % of an amplitude where the Gaussian loses 25 %, for a third more of the noise. For
+/// signals that a transient is judged by.
+pub fn smoothed_flat(values: &[f64], width: f64) -> Vec<f64> {
+    if values.is_empty() || width <= 0.0 {
+        return values.to_vec();
+    }
+    convolved(values, &flat_kernel(width))
+}
+
+fn flat_kernel(width: f64) -> Vec<f64> {
+    let half = (REACH * width + 0.5) as isize;
+    let places = || (-half..=half).map(|j| j as f64);
+    let weight = |x: f64| (-0.5 * (x / width).powi(2)).exp();
+    let moment = |n: i32| places().map(|x| x.powi(n) * weight(x)).sum::<f64>();
+    // Of the sampled and cut Gaussian, so that the moments hold at any width.
+    let (m0, m2, m4) = (moment(0), moment(2), moment(4));
+    let d = m0 * m4 - m2 * m2;
+    let (b, c) = if d > 0.0 { (m4 / d, -m2 / d) } else { (1.0 / m0, 0.0) };
+    places().map(|x| (b + c * x * x) * weight(x)).collect()
+}
+
+/// A signal, mirrored beyond its ends, behind an even number of weights around each sample and that at it.
+fn convolved(values: &[f64], kernel: &[f64]) -> Vec<f64> {
+    let n = values.len();
     let half = kernel.len() / 2;
     let mirrored = |i: isize| {
         let period = 2 * n as isize;
@@ -21,7 +48,7 @@ pub fn gaussian(values: &[f64], width: f64, order: usize) -> Vec<f64> {
     (0..n)
         .map(|i| {
             if i >= half && i + half < n {
-                values[i - half..=i + half].iter().zip(&kernel).map(|(x, k)| x * k).sum()
+                values[i - half..=i + half].iter().zip(kernel).map(|(x, k)| x * k).sum()
             } else {
                 kernel
                     .iter()
@@ -159,6 +186,21 @@ pub fn median_magnitude(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flat_smoothing_passes_cubics_and_keeps_a_mode_that_the_gaussian_loses() {
+        for width in [0.6, 0.8, 1.0, 2.5] {
+            let cubic: Vec<f64> = (0..60).map(|i| (f64::from(i) * 0.1 - 3.0).powi(3)).collect();
+            let smooth = smoothed_flat(&cubic, width);
+            for i in 15..45 {
+                assert!((smooth[i] - cubic[i]).abs() < 1e-9, "{width} {i}");
+            }
+        }
+        let mode: Vec<f64> = (0..200).map(|i| (0.75 * f64::from(i)).sin()).collect();
+        let kept = |smooth: Vec<f64>| rms(&smooth[50..150]) / rms(&mode[50..150]);
+        assert!((0.95..0.99).contains(&kept(smoothed_flat(&mode, 1.0))));
+        assert!(kept(gaussian(&mode, 1.0, 0)) < 0.78);
+    }
 
     #[test]
     fn a_gaussian_filter_keeps_a_line_and_gives_the_derivatives_of_a_cubic() {

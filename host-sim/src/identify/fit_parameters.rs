@@ -132,6 +132,15 @@ pub fn values(model: &ModelFile, baseline: &Baseline, p: &[f64], free: &[String]
     free.iter().map(|name| value(model, baseline, p, name)).collect()
 }
 
+/// Sets the file's numbers, whichever way they bound each other.
+pub(super) fn set_all(model: &mut ModelFile, names: &[String], values: &[f64]) -> Result<(), InputError> {
+    let set = |model: &mut ModelFile| {
+        names.iter().zip(values).map(|(name, value)| model.set(name, *value)).fold(Ok(()), Result::and)
+    };
+    // Kinetic friction may have to wait for static friction to be raised, in the first round.
+    set(model).or_else(|_| set(model))
+}
+
 /// ∂ ln(file's parameters)/∂(baseline's values), a row for each parameter.
 pub fn log_derivatives(model: &ModelFile, baseline: &Baseline, p: &[f64], free: &[String]) -> DMatrix<f64> {
     DMatrix::from_fn(free.len(), p.len(), |row, column| {

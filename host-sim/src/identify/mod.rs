@@ -11,6 +11,7 @@ pub mod fit_contact;
 mod fit_interval;
 pub mod fit_parameters;
 mod fit_posterior;
+mod fit_simulated;
 pub mod grid;
 pub mod holdout;
 pub mod judge;

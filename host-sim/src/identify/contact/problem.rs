@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::change::{Change, ContactTerm};
 use super::law::{Contact, Curve};
-use super::log::ContactLog;
+use super::log::{ContactLog, OBSERVED_OVER};
 pub use super::noise::Noise;
-use super::observer::{Drive, Observed, observe};
-use crate::identify::filters::{gaussian, rms, shifted};
+use super::observer::{Drive, Observed, SLIP_NOISES, observe};
+use crate::identify::filters::{gaussian, rms, shifted, smoothed_flat};
 use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
 use crate::predict::SecondOrder;
@@ -21,10 +21,8 @@ use crate::predict::SecondOrder;
 pub const FREEDOM: f64 = 4.0;
 /// The baseline's parameters stay within so many deviations of their prior.
 const BOUND: f64 = 3.0;
-/// Slip is faster than this share of the root's usual speed, …
+/// Slip is faster than this share of the root's usual speed.
 const SLOWEST_SLIP: f64 = 0.015;
-/// … and than so many deviations of the speed's noise.
-const SLIP_NOISES: f64 = 4.0;
 /// Drift of the root against the measured motion, relative to its usual speed: what the elements' way differs by.
 const DRIFT: f64 = 5e-4;
 /// A sample is well known where its deviation is less than this share of the usual torque.
@@ -257,9 +255,14 @@ impl<'a> Problem<'a> {
                         seen.iter_mut().zip(&added[at]).for_each(|(x, a)| *x -= a);
                     }
                     // A mode rings at its frequency; the force behind it is what is slower.
-                    let width = ringing.map_or(0.8, |(hz, _)| (0.4 / (hz * step_s)).clamp(0.8, 12.0));
-                    let delay = ringing.map_or(0.0, |(hz, zeta)| SecondOrder::delay_s(hz, zeta) / step_s);
-                    shifted(&gaussian(&seen, width, 0), log.friction_late + late + delay)
+                    let (behind, delay) = match ringing {
+                        None => (smoothed_flat(&seen, OBSERVED_OVER), 0.0),
+                        Some((hz, zeta)) => {
+                            let width = (0.4 / (hz * step_s)).clamp(OBSERVED_OVER, 12.0);
+                            (gaussian(&seen, width, 0), SecondOrder::delay_s(hz, zeta) / step_s)
+                        }
+                    };
+                    shifted(&behind, log.friction_late + late + delay)
                 }
             };
             let force_n: Vec<f64> = seen.iter().map(|t| t / log.radius_m).collect();
