@@ -14,13 +14,14 @@
 //! still answers, says so, and its times and speeds are off by as much. When the crystal fails later, the
 //! clock security system traps, and the trap makes safe.
 
-use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use cortex_m::peripheral::NVIC;
+use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::rcc::{
     self, AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource,
     Sysclk, VoltageScale, mux,
 };
 use embassy_stm32::time::Hertz;
-use embassy_stm32::{Config, pac};
+use embassy_stm32::{Config, Peripherals, pac};
 
 /// Rate of the core and of its cycle counter.
 pub const CORE_HZ: u32 = 480_000_000;
@@ -39,9 +40,28 @@ pub fn crystal_present() -> bool {
     ready
 }
 
-/// The clock tree of the table above.
+/// Sets up the clock tree, and starts the executor's clock.
+///
+/// That clock (embassy-stm32, `time_driver/gp16.rs`) counts half turns of TIM3's counter in an interrupt, and takes a count
+/// whose lowest bit is not the counter's highest for one whose interrupt is still to come. Its start generates an update
+/// (UG), which sets the counter to 0 while CCR1 is 0 too: a match (CC1IF, RM0433 38.4.5), counted as a half turn as soon as
+/// interrupts are on. From then on the count is one ahead, and a look at the time just after a half turn, before its
+/// interrupt, is 65.5 ms early: a task may then sleep a whole turn too long. So the flag goes before it can interrupt. Whether
+/// this chip sets it at UG is not said in the manual; the bench does.
 #[must_use]
-pub fn config(crystal: bool) -> Config {
+pub fn start(crystal: bool) -> Peripherals {
+    cortex_m::interrupt::free(|_| {
+        let peripherals = embassy_stm32::init(config(crystal));
+        // Flags are cleared by zeros, and the write has landed when it is read back: only then is the request gone.
+        pac::TIM3.sr().write(|w| w.0 = 0);
+        let _ = pac::TIM3.sr().read();
+        NVIC::unpend(Interrupt::TIM3);
+        peripherals
+    })
+}
+
+/// The clock tree of the table above.
+fn config(crystal: bool) -> Config {
     let mut config = Config::default();
     let (source, prediv) = if crystal {
         config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });

@@ -28,7 +28,7 @@ pub fn start() -> Started {
     let reset = restart::reset_cause();
     let crash_record = crash_record::take();
     let crystal = clocks::crystal_present();
-    let board = board::configure(embassy_stm32::init(clocks::config(crystal)));
+    let board = board::configure(clocks::start(crystal));
     outputs::start();
     clocks::yield_to_the_tick();
     supply::watch();

@@ -3,6 +3,7 @@
 use super::firmware;
 use host_sim::files::experiment_file::ExperimentFile;
 use model_core::control::{Fault, Mode};
+use object::{Object, ObjectSymbol};
 use rig_link::message::{Answer, Command, Rejection};
 use rig_link::telemetry::{BINS, Health, StartHistogram};
 use std::sync::OnceLock;
@@ -43,6 +44,47 @@ fn health(endpoint: &mut Endpoint, listener: &mut ListeningHost) -> Result<Healt
     listener.health = None;
     listener.listen(endpoint, endpoint.now_ns() + 210_000_000)?;
     listener.health.ok_or_else(|| BenchError::Rig("it does not tell its health".to_owned()))
+}
+
+/// The time driver's static, as its symbol is mangled.
+const DRIVER: &str = "11time_driver6driver6DRIVER";
+/// `TIM3_CNT`, and the half turns that the driver counts.
+const TIM3_COUNT: u64 = 0x4000_0424;
+const HALF_TURN_NS: u64 = 32_768_000;
+
+/// It takes a count whose lowest bit is not the counter's highest for one that is behind by one: a count that is ahead
+/// gives a time that is 65.5 ms early just after each half turn, and now and then a task that sleeps as much too long.
+#[test]
+fn the_executors_count_of_half_turns_is_in_step_with_its_counter() {
+    let object = object::File::parse(firmware().bytes.as_slice()).unwrap();
+    let driver =
+        object.symbols().find(|symbol| symbol.name().is_ok_and(|name| name.contains(DRIVER))).unwrap();
+    let (address, length) = (driver.address(), driver.size());
+    let (counts, half) = from(State::Idle, |endpoint, _| {
+        let mut half = || -> Result<u64, BenchError> {
+            loop {
+                let count = endpoint.register(TIM3_COUNT)?;
+                if (0x2000..0x6000).contains(&(count & 0x7FFF)) {
+                    return Ok(count >> 15);
+                }
+                endpoint.wait_until(endpoint.now_ns() + HALF_TURN_NS / 4)?;
+            }
+        };
+        let half = half()?;
+        let words = |bytes: Vec<u8>| -> Vec<u32> {
+            bytes.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect()
+        };
+        let before = words(endpoint.memory(address, length)?);
+        endpoint.wait_until(endpoint.now_ns() + 3 * HALF_TURN_NS)?;
+        let after = words(endpoint.memory(address, length)?);
+        // Of its words the one that grows by one with each half turn.
+        let counts: Vec<u32> =
+            before.iter().zip(&after).filter(|(a, b)| b.wrapping_sub(**a) == 3).map(|(a, _)| *a).collect();
+        Ok((counts, half))
+    })
+    .operator;
+    assert_eq!(counts.len(), 1, "{counts:?}");
+    assert_eq!(u64::from(counts[0] & 1), half & 1, "count {}", counts[0]);
 }
 
 #[test]
