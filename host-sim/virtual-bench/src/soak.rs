@@ -19,6 +19,7 @@ use host_sim::link::run_experiment::{RunExperiment, RunOptions};
 use rig_link::capture::CaptureTrigger;
 use rig_link::message::{Answer, Command};
 use rig_link::model::ModelRecord;
+use rig_link::telemetry::Health;
 use serde::Serialize;
 
 /// Counts of a turn of the assumed rig's encoders.
@@ -79,8 +80,9 @@ fn operate(
     boot(endpoint)?;
     let mut soaked = Soaked::default();
     let mut chance = Chance(seed);
+    let mut health = Health::default();
     while now_s(endpoint) < seconds {
-        round(endpoint, &mut chance, &mut soaked)?;
+        health = round(endpoint, &mut chance, &health, &mut soaked)?;
         // A run of an hour must not keep its log.
         endpoint.take_log()?;
         tell(now_s(endpoint));
@@ -88,7 +90,7 @@ fn operate(
     soaked.seconds = now_s(endpoint);
     soaked.stack.mark = stack::mark(endpoint)?;
     stack::measure_interrupts(endpoint)?;
-    round(endpoint, &mut chance, &mut soaked)?;
+    round(endpoint, &mut chance, &health, &mut soaked)?;
     (soaked.stack.tick, soaked.stack.drivers) = stack::interrupts(endpoint)?;
     if soaked.stack.left().is_none() {
         soaked.problems.push(soaked.stack.to_string());
@@ -103,8 +105,14 @@ fn now_s(endpoint: &Endpoint) -> f64 {
     endpoint.now_ns() as f64 * 1e-9
 }
 
-/// Some commands, an experiment, and a look at everything.
-fn round(endpoint: &mut Endpoint, chance: &mut Chance, soaked: &mut Soaked) -> Result<(), BenchError> {
+/// Some commands, an experiment, and a look at everything that was counted since the last time, when the rig's health was
+/// `before`; gives its health now.
+fn round(
+    endpoint: &mut Endpoint,
+    chance: &mut Chance,
+    before: &Health,
+    soaked: &mut Soaked,
+) -> Result<Health, BenchError> {
     let mut client = Client::new();
     let mut commands = vec![Command::Hello, Command::Tare, Command::CaptureArm(CaptureTrigger::Start)];
     if chance.below(4) == 0 {
@@ -138,13 +146,13 @@ fn round(endpoint: &mut Endpoint, chance: &mut Chance, soaked: &mut Soaked) -> R
     let counts = [
         (rows::missing(&run.rows), "rows are missing"),
         (expected.saturating_sub(run.rows.len() as u64), "rows of the experiment did not come"),
-        (u64::from(health.telemetry_lost), "rows found no room"),
-        (u64::from(health.events_lost), "events found no room"),
+        (gained(before.telemetry_lost, health.telemetry_lost), "rows found no room"),
+        (gained(before.events_lost, health.events_lost), "events found no room"),
         (u64::from(run.frames_rejected), "frames came in damaged"),
-        (u64::from(health.frames_rejected), "frames were thrown away by the rig"),
-        (u64::from(health.line_errors), "errors on the line"),
-        (u64::from(health.deadline_misses), "ticks ended late"),
-        (u64::from(health.missed_scans), "scans were missed"),
+        (gained(before.frames_rejected, health.frames_rejected), "frames were thrown away by the rig"),
+        (gained(before.line_errors, health.line_errors), "errors on the line"),
+        (gained(before.deadline_misses, health.deadline_misses), "ticks ended late"),
+        (gained(before.missed_scans, health.missed_scans), "scans were missed"),
     ];
     let at = format!("at {:.0} s", now_s(endpoint));
     for (count, what) in counts.into_iter().filter(|(count, _)| *count > 0) {
@@ -153,7 +161,13 @@ fn round(endpoint: &mut Endpoint, chance: &mut Chance, soaked: &mut Soaked) -> R
     if let Some(fault) = run.fault_words() {
         soaked.problems.push(format!("{at}: {fault}, in {text}"));
     }
-    angle(endpoint, &mut client, soaked)
+    angle(endpoint, &mut client, soaked)?;
+    Ok(health)
+}
+
+/// What one of the rig's counters, which only grow, gained.
+fn gained(before: u32, now: u32) -> u64 {
+    u64::from(now.wrapping_sub(before))
 }
 
 /// The disc at rest against the rig's count.

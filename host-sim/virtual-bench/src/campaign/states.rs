@@ -115,7 +115,7 @@ impl State {
 /// and better.
 const REHEARSED_NS: u64 = 60_000_000;
 
-/// Arms, has something go wrong, puts it right and clears it: once for each way a fault comes in.
+/// Arms, has something go wrong, puts it right and clears it: once by an input of the supervisor, once by a sensor.
 fn through_faults(endpoint: &mut Endpoint) -> Result<(), BenchError> {
     let mut listener = ListeningHost::new();
     accepted(endpoint, &mut listener, &Command::Telemetry { every_ticks: EVERY_TICKS })?;
