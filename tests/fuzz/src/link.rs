@@ -230,7 +230,7 @@ impl Rig {
 pub fn commands(bytes: &[u8]) {
     let mut script = Script(bytes);
     let (mut rig, most_ticks) = match script.byte() {
-        Some(0) => (Rig::new(), 4_000),
+        Some(0) => (Rig::new(), 1_500),
         _ => (STARTED.clone(), 600),
     };
     let mut ticks = 0_u32;
