@@ -9,6 +9,7 @@ pub mod files;
 pub mod fit;
 pub mod identify;
 pub mod input_error;
+mod least_squares;
 pub mod link;
 pub mod lockstep;
 pub mod notices;

@@ -94,7 +94,7 @@ struct ContactSummary {
     kind: &'static str,
     #[serde(flatten)]
     fit: Part,
-    /// Of the friction law at the slip observed from the measured force: what was fitted.
+    /// Of the friction law at the slip observed from the measured force.
     nrmse_by_observed_slip: f64,
     /// Whether a simulation decided in the end, since it left less than the observed slip.
     fitted_by_simulation: bool,

@@ -28,8 +28,8 @@ pub fn model_kinds() -> Vec<(&'static str, ModelKind)> {
     ModelKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect()
 }
 
-/// Any step size, to have the numbers checked.
-const SOME_STEP_S: f64 = 1e-4;
+/// Any step size, for what does not depend on it: to have numbers checked, to prepare a model that is given its step later.
+pub(crate) const SOME_STEP_S: f64 = 1e-4;
 
 /// What `fit` found about a parameter's uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]

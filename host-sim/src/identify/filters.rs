@@ -11,7 +11,8 @@ pub fn gaussian(values: &[f64], width: f64, order: usize) -> Vec<f64> {
     if n == 0 || width <= 0.0 {
         return values.to_vec();
     }
-    convolved(values, &kernel(width, order))
+    // A first derivative stays a Gaussian's: what smooths the other terms smooths it alike.
+    convolved(values, &kernel(width, order, order >= 2))
 }
 
 /// Values smoothed with (3 − x²/w²)/2 times a Gaussian of width w (samples), so that polynomials up to the third degree pass
@@ -21,19 +22,7 @@ pub fn smoothed_flat(values: &[f64], width: f64) -> Vec<f64> {
     if values.is_empty() || width <= 0.0 {
         return values.to_vec();
     }
-    convolved(values, &flat_kernel(width))
-}
-
-fn flat_kernel(width: f64) -> Vec<f64> {
-    let half = (REACH * width + 0.5) as isize;
-    let places = || (-half..=half).map(|j| j as f64);
-    let weight = |x: f64| (-0.5 * (x / width).powi(2)).exp();
-    let moment = |n: i32| places().map(|x| x.powi(n) * weight(x)).sum::<f64>();
-    // Of the sampled and cut Gaussian, so that the moments hold at any width.
-    let (m0, m2, m4) = (moment(0), moment(2), moment(4));
-    let d = m0 * m4 - m2 * m2;
-    let (b, c) = if d > 0.0 { (m4 / d, -m2 / d) } else { (1.0 / m0, 0.0) };
-    places().map(|x| (b + c * x * x) * weight(x)).collect()
+    convolved(values, &kernel(width, 0, true))
 }
 
 /// A signal, mirrored beyond its ends, behind an even number of weights around each sample and that at it.
@@ -61,32 +50,27 @@ fn convolved(values: &[f64], kernel: &[f64]) -> Vec<f64> {
 }
 
 /// Weights on the samples before, at and after. A sampled and cut derivative of a Gaussian has wrong moments, and a
-/// position is large against its second difference; so the weights are (b + c x²)·Gaussian, for odd orders times x, with
-/// b and c such that polynomials up to the third degree give their derivatives exactly.
-fn kernel(width: f64, order: usize) -> Vec<f64> {
+/// position is large against its second difference; so `exact` weights are (b + c x²)·Gaussian, for odd orders times x, with
+/// b and c such that polynomials up to the third degree give their derivatives exactly. Others are the Gaussian alone.
+fn kernel(width: f64, order: usize, exact: bool) -> Vec<f64> {
     let half = (REACH * width + 0.5) as isize;
     let places = || (-half..=half).map(|j| j as f64);
     let weight = |x: f64| (-0.5 * (x / width).powi(2)).exp();
+    // Of the sampled and cut Gaussian, so that the moments hold at any width.
     let moment = |n: i32| places().map(|x| x.powi(n) * weight(x)).sum::<f64>();
     let odd = (order % 2) as i32;
     // Σ (b + c x²) x^(2 odd) w = lower, Σ (b + c x²) x^(2 + 2 odd) w = upper.
     let (lower, upper) = match order {
-        0 => (1.0, 0.0),
-        1 => (1.0, 0.0),
+        0 | 1 => (1.0, 0.0),
         2 => (0.0, 2.0),
         _ => (0.0, 6.0),
     };
-    let (b, c) = if order == 0 {
-        (1.0 / moment(0), 0.0)
+    let (m0, m2, m4) = (moment(2 * odd), moment(2 + 2 * odd), moment(4 + 2 * odd));
+    let d = m0 * m4 - m2 * m2;
+    let (b, c) = if exact && d > 0.0 {
+        ((lower * m4 - upper * m2) / d, (upper * m0 - lower * m2) / d)
     } else {
-        let (m0, m2, m4) = (moment(2 * odd), moment(2 + 2 * odd), moment(4 + 2 * odd));
-        // A first derivative stays a Gaussian's: what smooths the other terms smooths it alike.
-        if order == 1 {
-            (1.0 / m0, 0.0)
-        } else {
-            let d = m0 * m4 - m2 * m2;
-            ((lower * m4 - upper * m2) / d, (upper * m0 - lower * m2) / d)
-        }
+        (1.0 / m0, 0.0)
     };
     places().map(|x| (b + c * x * x) * x.powi(odd) * weight(x)).collect()
 }

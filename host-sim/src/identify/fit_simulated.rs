@@ -9,30 +9,32 @@
 //! Plain least squares (Levenberg–Marquardt in Moré's form, crate `levenberg-marquardt`) and no weights: the steps are few
 //! samples with large errors, which a robust likelihood would take for outliers.
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use std::cell::RefCell;
+
+use levenberg_marquardt::LevenbergMarquardt;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contact::problem::{Baseline, Role};
-use super::filters::gaussian;
+use super::filters::{gaussian, rms};
 use super::fit_parameters::{set_all, values};
 use crate::files::log::Log;
-use crate::files::model_file::ModelFile;
+use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
+use crate::least_squares::Problem;
 use crate::predict::curve::shifted;
 use crate::predict::{Accuracy, ContactInputs, StepPlan, simulate_planned};
 
-/// Any step size, before the plan sets it.
-const SOME_STEP_S: f64 = 1e-4;
 /// Step of the differences, in ln: the simulation's own steps leave 1e-6 in its slopes.
 const DIFFERENCE: f64 = 1e-3;
-/// Steps over the number of parameters + 1, at most, in each search; each takes as many simulations.
+/// Evaluations over the number of parameters + 1, at most, in each search: from near by, LM needs fewer steps than there are
+/// parameters, and each takes as many simulations.
 const PATIENCE: usize = 1;
-/// ln of factors on the damping at which a search begins: below some damping a simulation sticks and slips where the rig did
-/// not, which no slope shows.
+/// ln of factors on the damping at which a search begins, 0.7 to 2.7: the observed slip finds it too low more often than too
+/// high, and below some damping a simulation sticks and slips where the rig did not, which no slope shows.
 const DAMPINGS: [f64; 6] = [0.0, -0.4, 0.2, 0.4, 0.7, 1.0];
-/// Searches, from the best of those.
+/// Searches, from the best of those: a second one costs nothing on two cores.
 const SEARCHES: usize = 2;
 /// Widths of the Gaussian over which residuals are smoothed, s, one search after the other. A tip that breaks away at another
 /// instant is an error that no slope shows, but over a wider filter it is: so the search begins with a wide one. The last is
@@ -69,11 +71,6 @@ pub(super) struct SimulatedFit {
     pub(super) jacobian: DMatrix<f64>,
 }
 
-/// Root mean square.
-fn rms(values: &DVector<f64>) -> f64 {
-    values.norm() / (values.len().max(1) as f64).sqrt()
-}
-
 /// Over a Gaussian of so many samples; one narrower than a sample leaves them as they are.
 fn smoothed(values: &[f64], width: f64) -> Vec<f64> {
     if width < 0.5 { values.to_vec() } else { gaussian(values, width, 0) }
@@ -81,7 +78,7 @@ fn smoothed(values: &[f64], width: f64) -> Vec<f64> {
 
 /// RMS of residuals on an even grid of this step, smoothed as those of the last search.
 pub(super) fn smoothed_rms(residual_nm: &[f64], step_s: f64) -> f64 {
-    rms(&DVector::from_vec(smoothed(residual_nm, WIDTHS_S[WIDTHS_S.len() - 1] / step_s)))
+    rms(&smoothed(residual_nm, WIDTHS_S[WIDTHS_S.len() - 1] / step_s))
 }
 
 impl<'a> Simulated<'a> {
@@ -130,37 +127,29 @@ impl<'a> Simulated<'a> {
         residual.iter().all(|r| r.is_finite()).then_some(residual)
     }
 
-    fn jacobian(&self, p: &[f64], width_s: f64) -> Option<DMatrix<f64>> {
-        let here = self.residual_nm(p, width_s)?;
+    /// Slopes of the residual over the values, about `p` where it is `here`.
+    fn jacobian(&self, p: &[f64], here: &DVector<f64>, width_s: f64) -> Option<DMatrix<f64>> {
         let columns = (0..p.len()).into_par_iter().map(|i| {
             let mut q = p.to_vec();
             q[i] += DIFFERENCE;
-            Some((self.residual_nm(&q, width_s)? - &here) / DIFFERENCE)
+            Some((self.residual_nm(&q, width_s)? - here) / DIFFERENCE)
         });
         Some(DMatrix::from_columns(&columns.collect::<Option<Vec<_>>>()?))
     }
 
     /// The best fit from the values `from` and others beside them, where it leaves less than the observed slip did.
     pub(super) fn fit(&self, from: &[f64], progress: &(dyn Fn() + Sync)) -> Option<SimulatedFit> {
-        let damping = self.baseline.free.iter().position(|base| base.role == Role::Damping);
-        let moved = |by: f64| {
-            let mut p = from.to_vec();
-            p[damping?] += by;
-            Some(p)
-        };
-        let starts = match damping {
-            Some(_) => DAMPINGS.into_iter().filter_map(moved).collect(),
-            None => vec![from.to_vec()],
-        };
         let [widest, .., finest] = WIDTHS_S;
-        let mut tried: Vec<(f64, Vec<f64>)> =
-            starts.into_par_iter().filter_map(|p| Some((rms(&self.residual_nm(&p, widest)?), p))).collect();
+        let of = |p: &[f64], width_s: f64| Some(rms(self.residual_nm(p, width_s)?.as_slice()));
+        let mut tried: Vec<(f64, Vec<f64>)> = self
+            .starts(from)
+            .into_par_iter()
+            .filter_map(|start| Some((of(&start, widest)?, start)))
+            .collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let search = |from: &[f64], width_s: f64| {
-            let search = Search { of: self, width_s, at: DVector::from_column_slice(from), progress };
-            let lm = LevenbergMarquardt::new().with_ftol(1e-6).with_xtol(1e-5).with_patience(PATIENCE);
-            let p = lm.minimize(search).0.at.as_slice().to_vec();
-            Some((rms(&self.residual_nm(&p, width_s)?), p))
+            let p = self.search(from, width_s, progress);
+            Some((of(&p, width_s)?, p))
         };
         let first = tried.into_par_iter().take(SEARCHES).filter_map(|(_, start)| search(&start, widest));
         let best = first.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -173,50 +162,55 @@ impl<'a> Simulated<'a> {
         if left >= self.deviation_nm {
             return None;
         }
-        let (residual_nm, jacobian) = (self.residual_nm(&p, finest)?, self.jacobian(&p, finest)?);
+        let residual_nm = self.residual_nm(&p, finest)?;
+        let jacobian = self.jacobian(&p, &residual_nm, finest)?;
         Some(SimulatedFit { p, residual_nm, jacobian })
     }
-}
 
-/// Least squares of the residual, and of the values about their prior.
-struct Search<'a> {
-    of: &'a Simulated<'a>,
-    width_s: f64,
-    at: DVector<f64>,
-    /// Hears of each step.
-    progress: &'a (dyn Fn() + Sync),
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, x: &DVector<f64>) {
-        self.at.copy_from(x);
+    /// The values `from`, with other dampings where the model has one.
+    fn starts(&self, from: &[f64]) -> Vec<Vec<f64>> {
+        let Some(damping) = self.baseline.free.iter().position(|base| base.role == Role::Damping) else {
+            return vec![from.to_vec()];
+        };
+        let moved = |by: f64| {
+            let mut p = from.to_vec();
+            p[damping] += by;
+            p
+        };
+        DAMPINGS.into_iter().map(moved).collect()
     }
 
-    fn params(&self) -> DVector<f64> {
-        self.at.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let residual = self.of.residual_nm(self.at.as_slice(), self.width_s)?;
-        let prior = self.of.baseline.free.iter().zip(self.at.iter()).map(|(base, x)| {
-            let q = &base.parameter;
-            self.of.deviation_nm * (x - q.mean) / q.sd
-        });
-        Some(DVector::from_iterator(residual.len() + self.at.len(), residual.iter().copied().chain(prior)))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        (self.progress)();
-        let of_residual = self.of.jacobian(self.at.as_slice(), self.width_s)?;
-        let (rows, columns) = of_residual.shape();
-        Some(DMatrix::from_fn(rows + columns, columns, |i, j| match i.checked_sub(rows) {
-            None => of_residual[(i, j)],
-            Some(of) if of == j => self.of.deviation_nm / self.of.baseline.free[j].parameter.sd,
-            Some(_) => 0.0,
-        }))
+    /// Least squares of the residual, and of the values about their prior.
+    fn search(&self, from: &[f64], width_s: f64, progress: &(dyn Fn() + Sync)) -> Vec<f64> {
+        let free = &self.baseline.free;
+        // The search asks for residuals and then for the slopes there.
+        let known: RefCell<Option<(DVector<f64>, DVector<f64>)>> = RefCell::new(None);
+        let residuals = |p: &DVector<f64>| {
+            let residual = self.residual_nm(p.as_slice(), width_s)?;
+            let prior = free.iter().zip(p.iter()).map(|(base, x)| {
+                let q = &base.parameter;
+                self.deviation_nm * (x - q.mean) / q.sd
+            });
+            let all = DVector::from_iterator(residual.len() + p.len(), residual.iter().copied().chain(prior));
+            *known.borrow_mut() = Some((p.clone(), residual));
+            Some(all)
+        };
+        let jacobian = |p: &DVector<f64>| {
+            progress();
+            let here = match known.take() {
+                Some((at, residual)) if at == *p => residual,
+                _ => self.residual_nm(p.as_slice(), width_s)?,
+            };
+            let of_residual = self.jacobian(p.as_slice(), &here, width_s)?;
+            let (rows, columns) = of_residual.shape();
+            Some(DMatrix::from_fn(rows + columns, columns, |i, j| match i.checked_sub(rows) {
+                None => of_residual[(i, j)],
+                Some(of) if of == j => self.deviation_nm / free[j].parameter.sd,
+                Some(_) => 0.0,
+            }))
+        };
+        let problem = Problem { at: DVector::from_column_slice(from), residuals, jacobian };
+        let lm = LevenbergMarquardt::new().with_ftol(1e-6).with_xtol(1e-5).with_patience(PATIENCE);
+        lm.minimize(problem).0.at.as_slice().to_vec()
     }
 }

@@ -9,10 +9,7 @@ use model_core::extension::{ExtendedFriction, ExtendedInput, ExtendedState, Exte
 
 use super::elements::{ElementModel, ElementParameters};
 use crate::files::effect_id::{Subsystem, subsystem_of};
-use crate::files::model_file::ModelFile;
-
-/// Any step, to prepare effects with; each grid sets its own.
-const SOME_STEP_S: f64 = 1e-4;
+use crate::files::model_file::{ModelFile, SOME_STEP_S};
 
 /// The model's effects that change friction itself; `None` where it has none.
 pub(super) fn of_contact(model: &ModelFile) -> Option<Extensions<f64>> {

@@ -4,6 +4,7 @@
 //! so one is integrated and its force taken three times: exact, and three times as fast.
 
 use super::effects::Affected;
+use crate::files::model_file::SOME_STEP_S;
 use model_core::error::ParameterError;
 use model_core::extension::{ExtendedState, Extensions};
 use model_core::friction::lugre_patch::{LugrePatch, PatchParameters, PatchState};
@@ -79,9 +80,6 @@ impl ElementParameters {
         }
     }
 }
-
-/// Any step, to ask a model what does not depend on it.
-const SOME_STEP_S: f64 = 1e-4;
 
 /// What the rig presses with at most, about.
 const LARGE_LOAD_N: f64 = 200.0;

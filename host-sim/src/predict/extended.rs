@@ -11,10 +11,10 @@ use model_core::extension::adc_saturation::AdcSaturation;
 use model_core::extension::{ExtendedFriction, ExtendedInput, Extension, Extensions};
 
 use super::curve::shifted;
-use super::friction::{SOME_STEP_S, StepPlan};
+use super::friction::StepPlan;
 use super::inputs::ContactInputs;
 use super::second_order::SecondOrder;
-use crate::files::model_file::ModelFile;
+use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 

@@ -14,7 +14,7 @@ use super::bridge::BridgeModel;
 use super::curve::Curve;
 use super::extended;
 use super::inputs::ContactInputs;
-use crate::files::model_file::ModelFile;
+use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::{Bridge, RigFile};
 use crate::input_error::InputError;
 
@@ -24,8 +24,6 @@ const CHANGE_OF_G: f64 = 2e-3;
 const CHANGE_OF_LOAD: f64 = 1e-2;
 /// Longest step where a bridge follows: a tenth of the period of a mode of 400 Hz.
 const LONGEST_BRIDGE_STEP_S: f64 = 250e-6;
-/// Any step size, before the first step sets it.
-pub(super) const SOME_STEP_S: f64 = 1e-4;
 /// After a turn the bristles of the modified model, stepped in first order, get so many steps for each
 /// largest deflection that is slid, …
 const STEPS_PER_REACH: f64 = 20.0;

@@ -7,10 +7,11 @@
 
 use std::cell::RefCell;
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use levenberg_marquardt::LevenbergMarquardt;
+use nalgebra::{DMatrix, DVector};
 
 use super::candidates::Candidate;
+use crate::least_squares::Problem;
 use model_core::friction::FrictionParameters;
 
 /// Step of the one-sided differences.
@@ -30,14 +31,13 @@ pub(super) enum Accuracy {
 /// Residuals of a set of parameters; their sum of squares is sought to be small.
 pub(super) type Residuals<'a> = dyn Fn(&FrictionParameters<f64>, Accuracy) -> Option<Vec<f64>> + 'a;
 
-struct Problem<'a> {
+struct Search<'a> {
     candidate: &'a Candidate,
     residuals: &'a Residuals<'a>,
     /// Of the derivatives.
     accuracy: Accuracy,
     /// Sum of squares with which a search is content.
     enough: f64,
-    at: DVector<f64>,
     best: RefCell<(f64, DVector<f64>)>,
 }
 
@@ -60,46 +60,32 @@ fn at(candidate: &Candidate, search: &DVector<f64>) -> FrictionParameters<f64> {
     })
 }
 
-impl Problem<'_> {
+impl Search<'_> {
     fn evaluate(&self, search: &DVector<f64>, accuracy: Accuracy) -> Option<DVector<f64>> {
         let residuals = (self.residuals)(&at(self.candidate, search), accuracy)?;
         residuals.iter().all(|r| r.is_finite()).then(|| DVector::from_vec(residuals))
     }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, x: &DVector<f64>) {
-        self.at.copy_from(x);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.at.clone()
-    }
 
     /// `None`, which ends the search, where it has been good enough.
-    fn residuals(&self) -> Option<DVector<f64>> {
+    fn residuals(&self, y: &DVector<f64>) -> Option<DVector<f64>> {
         if self.best.borrow().0 < self.enough {
             return None;
         }
-        let residuals = self.evaluate(&self.at, Accuracy::Fine)?;
+        let residuals = self.evaluate(y, Accuracy::Fine)?;
         let sum = residuals.norm_squared();
         if sum < self.best.borrow().0 {
-            *self.best.borrow_mut() = (sum, self.at.clone());
+            *self.best.borrow_mut() = (sum, y.clone());
         }
         Some(residuals)
     }
 
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
+    fn jacobian(&self, y: &DVector<f64>) -> Option<DMatrix<f64>> {
         if self.best.borrow().0 < self.enough {
             return None;
         }
-        let here = self.evaluate(&self.at, self.accuracy)?;
-        let columns = (0..self.at.len()).map(|column| {
-            let mut moved = self.at.clone();
+        let here = self.evaluate(y, self.accuracy)?;
+        let columns = (0..y.len()).map(|column| {
+            let mut moved = y.clone();
             moved[column] += DIFFERENCE;
             Some((self.evaluate(&moved, self.accuracy)? - &here) / DIFFERENCE)
         });
@@ -130,13 +116,14 @@ pub(super) fn fit(
         });
         let first = DVector::from_iterator(candidate.free.len(), coordinates);
         let best = RefCell::new((f64::INFINITY, first.clone()));
-        let problem = Problem { candidate, residuals, accuracy, enough, at: first, best };
-        let (problem, _) = LevenbergMarquardt::new()
-            .with_ftol(1e-4)
-            .with_xtol(1e-5)
-            .with_patience(patience)
-            .minimize(problem);
-        let (sum, found) = problem.best.into_inner();
+        let search = Search { candidate, residuals, accuracy, enough, best };
+        let problem = Problem {
+            at: first,
+            residuals: |y: &DVector<f64>| search.residuals(y),
+            jacobian: |y: &DVector<f64>| search.jacobian(y),
+        };
+        LevenbergMarquardt::new().with_ftol(1e-4).with_xtol(1e-5).with_patience(patience).minimize(problem);
+        let (sum, found) = search.best.into_inner();
         sum.is_finite().then(|| (sum, at(candidate, &found)))
     };
     let mut best: Option<(f64, FrictionParameters<f64>)> = None;
