@@ -22,7 +22,7 @@ use model_core::control::AdcScan;
 
 /// DMA1 stream, and channel of DMAMUX1.
 const STREAM: usize = 7;
-/// DMAMUX1 request of ADC1 (RM0433, DMAMUX1 mapping).
+/// DMAMUX1 request of ADC1 (RM0433 rev 9, table 124).
 const ADC1_REQUEST: u8 = 9;
 /// Trigger input of ADC1 that TIM6's trigger output is wired to (RM0433, ADC external triggers).
 const TIM6_TRIGGER: u8 = 13;

@@ -27,7 +27,7 @@ use embassy_stm32::{peripherals, rcc};
 
 /// DMA1 streams, and channels of DMAMUX1, of M1's and M2's counters.
 const STREAMS: [usize; 2] = [5, 6];
-/// DMAMUX1 requests of TIM7's and TIM6's update (RM0433 table 121).
+/// DMAMUX1 requests of TIM7's and TIM6's update (RM0433 rev 9, table 124).
 const UPDATE_REQUESTS: [u8; 2] = [70, 69];
 
 /// Starts both counters at 0, and what latches them. The latching begins with the control period.

@@ -16,7 +16,7 @@ use embassy_stm32::pac::{EXTI, PWR};
 
 /// The highest level of the detector.
 const LEVEL: u8 = 6;
-/// Line of the detector at the EXTI (RM0433 table 148), which takes its rising output: the supply falls.
+/// Line of the detector at the EXTI (RM0433, EXTI event inputs), which takes its rising output: the supply falls.
 const LINE: usize = 16;
 
 /// From now on a supply that falls makes safe. One that is low already does not: it would restart for ever.

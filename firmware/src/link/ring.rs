@@ -21,7 +21,7 @@ use embassy_time::{Duration, Timer};
 
 /// DMA1 stream, and channel of DMAMUX1.
 const STREAM: usize = 1;
-/// DMAMUX1 request of USART3's receiver (RM0433, DMAMUX1 mapping).
+/// DMAMUX1 request of USART3's receiver (RM0433 rev 9, table 124).
 const USART3_RX_REQUEST: u8 = 45;
 /// Time between two looks.
 const LOOK: Duration = Duration::from_micros(500);

@@ -9,7 +9,7 @@ use rigless::soc::Width;
 use rigless::soc::stm32h743::generated::{DMA1, DMAMUX1, TIM6};
 use rigless::time::VirtualNanos;
 
-/// `DMAREQ_ID` of USART3's receiver and transmitter, RM0433 table 121.
+/// `DMAREQ_ID` of USART3's receiver and transmitter, RM0433 rev 9, table 124.
 const USART3_REQUESTS: [u64; 2] = [45, 46];
 /// `TRBUFF` of `DMA_SxCR`, RM0433 section 15.5.5.
 const TRBUFF: u64 = 1 << 20;

@@ -41,7 +41,7 @@ const DISABLED_WHILE_ARMED: &str = "ADDIS was written while ADSTART stands, so i
 /// Full scale of the inputs in the unit of [`TriggeredAdc::set_input`].
 pub const REFERENCE_MICROVOLT: u32 = 3_300_000;
 
-/// `TIM6_TRGO` as `EXTSEL` numbers it, RM0433 table 211.
+/// `TIM6_TRGO` as `EXTSEL` numbers it, RM0433, ADC external triggers.
 pub const TIM6_TRGO: u64 = 13;
 
 /// The word to write to `ISR` for an edge of trigger `source`.

@@ -1,14 +1,14 @@
-//! The independent watchdog, RM0433 chapter 44, which the emulator carries as a register file only.
+//! The independent watchdog, RM0433 rev 9, chapter 45, which the emulator carries as a register file only.
 //!
 //! | rule | section |
 //! |---|---|
-//! | `0xCCCC` in `KR` starts it and forces the LSI on; nothing but a reset stops it; the count starts at `0xFFF` | 44.3.1, 44.3.3 |
-//! | `0xAAAA` reloads the counter from the reload value in force | 44.3.1 |
-//! | `0x5555` opens `PR`, `RLR` and `WINR`; any other key, the reload among them, closes them; a write to a closed register is lost | 44.3.5 |
-//! | A new value takes up to five LSI cycles to reach the watchdog's own supply domain (here: five); `PVU`, `RVU`, `WVU` stand meanwhile, and for ever while the LSI is off | 44.4.2 to 44.4.5 |
-//! | Those registers read what is in force, so an old value while the flag stands; a second write while the flag stands does not count | 44.4.2 to 44.4.5 |
-//! | The counter loses one each 4·2^PR LSI cycles (256 at most); past its last count it resets the part: (RL + 1) · 4·2^PR / f_LSI from a reload | 44.3.1 |
-//! | A reload while the counter is above the window resets the part; a write of `WINR` with all flags clear reloads the counter | 44.3.2 |
+//! | `0xCCCC` in `KR` starts it and forces the LSI on; nothing but a reset stops it; the count starts at `0xFFF` | 45.3.1, 45.3.3 |
+//! | `0xAAAA` reloads the counter from the reload value in force | 45.3.1 |
+//! | `0x5555` opens `PR`, `RLR` and `WINR`; any other key, the reload among them, closes them; a write to a closed register is lost | 45.3.5 |
+//! | A new value takes up to five LSI cycles to reach the watchdog's own supply domain (here: five); `PVU`, `RVU`, `WVU` stand meanwhile, and for ever while the LSI is off | 45.4.2 to 45.4.5 |
+//! | Those registers read what is in force, so an old value while the flag stands; a second write while the flag stands does not count | 45.4.2 to 45.4.5 |
+//! | The counter loses one each 4·2^PR LSI cycles (256 at most); past its last count it resets the part: (RL + 1) · 4·2^PR / f_LSI from a reload | 45.3.1 |
+//! | A reload while the counter is above the window resets the part; a write of `WINR` with all flags clear reloads the counter | 45.3.2 |
 //!
 //! Left out: the hardware start by option byte, the freeze in debug and in the low-power modes, and the
 //! phase between bus clock and LSI (up to one LSI cycle of uncertainty on silicon).

@@ -1,4 +1,4 @@
-//! TIM6 as the source of the converter's trigger: the wire `tim6_trgo` of RM0433 table 211.
+//! TIM6 as the source of the converter's trigger: the wire `tim6_trgo` of RM0433, ADC external triggers.
 //!
 //! The emulator's timer counts the pulses of its trigger output, which `MMS` selects (RM0433 section 42.4.2);
 //! each new one is passed on to ADC1. Left out: the listeners other than ADC1.
