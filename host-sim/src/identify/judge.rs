@@ -14,6 +14,7 @@ use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
 use super::effects::{ContactView, DriveView, LIBRARY, NormalLoadView};
+use super::law_form::LAW_FORM;
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Rest};
 use crate::files::log::{Log, LogKind};
@@ -29,8 +30,6 @@ const LOG_PRIOR: f64 = -3.9;
 const EVIDENCE_SHARE: f64 = 0.1;
 /// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
 const LEFT_SHARE: f64 = 0.5;
-/// The law of a cause is right within this share of its size: what a second one adds may be the first one's form.
-const LAW_FORM: f64 = 0.05;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
 const SIZE_WIDTH: f64 = 0.25 / 1.7;
 /// Hypotheses below this probability say nothing of what is unknown.
@@ -513,6 +512,7 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
                     let others = best.sizes.iter().enumerate().filter(|(other, _)| *other != own);
                     let largest = others.map(|(_, size)| *size).fold(0.0, f64::max);
                     sizes[at] = sizes[at].max(*size);
+                    // What a second cause adds may be the first one's form.
                     over_floor[at] = over_floor[at].max(*size / best.floor.max(LAW_FORM * largest));
                 }
             }

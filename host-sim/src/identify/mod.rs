@@ -15,6 +15,7 @@ mod fit_simulated;
 pub mod grid;
 pub mod holdout;
 pub mod judge;
+mod law_form;
 pub mod linear;
 pub mod noise;
 pub mod normal_load;
