@@ -44,10 +44,10 @@ pub fn crystal_present() -> bool {
 ///
 /// That clock (embassy-stm32, `time_driver/gp16.rs`) counts half turns of TIM3's counter in an interrupt, and takes a count
 /// whose lowest bit is not the counter's highest for one whose interrupt is still to come. Its start generates an update
-/// (UG), which sets the counter to 0 while CCR1 is 0 too: a match (CC1IF, RM0433 rev 9, 39.4.5), counted as a half turn as soon as
-/// interrupts are on. From then on the count is one ahead, and a look at the time just after a half turn, before its
-/// interrupt, is 65.5 ms early: a task may then sleep a whole turn too long. So the flag goes before it can interrupt. Whether
-/// this chip sets it at UG is not said in the manual; the bench does.
+/// (UG), which sets the counter to 0 while CCR1 is 0 too: a match (CC1IF, RM0433 rev 9, 39.4.5), counted as a half turn as
+/// soon as interrupts are on. From then on the count is one ahead, and a look at the time just after a half turn, before
+/// its interrupt, is 65.5 ms early: a task may then sleep a whole turn too long. So the flag goes before it can interrupt.
+/// Whether this chip sets it at UG is not known here; the bench's timer does.
 #[must_use]
 pub fn start(crystal: bool) -> Peripherals {
     cortex_m::interrupt::free(|_| {
