@@ -102,8 +102,8 @@ impl<'a> Simulated<'a> {
             let inputs = ContactInputs::new(&signals, rig);
             let plan = StepPlan::new(&element, &rig.friction_bridge, &inputs, Accuracy::Fast);
             let last = inputs.time_s.last().copied().unwrap_or_default();
-            let step_s =
-                (last - inputs.time_s.first().copied().unwrap_or_default()) / inputs.len().max(2) as f64;
+            let step_s = (last - inputs.time_s.first().copied().unwrap_or_default())
+                / (inputs.len().max(2) - 1) as f64;
             Ok(Run { inputs, plan, measured_nm: signals.friction_torque_nm.to_vec(), step_s })
         });
         let runs = runs.collect::<Result<_, InputError>>()?;
