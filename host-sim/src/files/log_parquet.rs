@@ -4,7 +4,7 @@
 //! known column are refused like empty cells. Written are required doubles with Snappy, one row group,
 //! without statistics: equal logs give equal bytes. Left out: nested columns, other compressions.
 
-use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use parquet::basic::{Compression, ConvertedType, Encoding, Repetition, Type as P
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
@@ -21,23 +21,39 @@ use parquet::schema::types::{Type, TypePtr};
 use super::import::columns::Columns;
 use super::log::{Cells, Column, Log};
 use super::number;
+use super::whole_file::WholeFile;
 use crate::input_error::InputError;
+
+/// Room made for a column before its first page is read: what a file says of its rows may be wrong.
+const FIRST_ROWS: usize = 1 << 16;
 
 /// Metadata that other writers add about themselves.
 const NOT_OURS: [&str; 2] = ["ARROW:schema", "pandas"];
 
 /// Reads a log; checks its form, not what time does. `meant` says which columns are signals.
+///
+/// The library panics on some damaged files; what is damaged is refused here, whoever notices it.
 pub(super) fn read(path: &Path, meant: &Columns) -> Result<Log, InputError> {
+    // Nothing outlives the closure that a panic could have left half done.
+    catch_unwind(AssertUnwindSafe(|| read_unguarded(path, meant))).unwrap_or_else(|_| {
+        Err(InputError::in_file(path, "is damaged: the Parquet library could not go on")
+            .allowed("a whole Parquet file"))
+    })
+}
+
+fn read_unguarded(path: &Path, meant: &Columns) -> Result<Log, InputError> {
     let source = path.display().to_string();
     let refuse = |e: &ParquetError| {
         InputError::in_file(path, format!("cannot be read as Parquet: {e}"))
             .allowed("flat columns of numbers, uncompressed or Snappy")
     };
-    let file = File::open(path).map_err(|e| InputError::io(path, "read", &e))?;
-    if file.metadata().is_ok_and(|data| data.len() == 0) {
+    let file = std::fs::read(path).map_err(|e| InputError::io(path, "read", &e))?;
+    let length = file.len() as u64;
+    if length == 0 {
         return Err(InputError::in_file(path, "is empty").allowed("a Parquet file"));
     }
-    let reader = SerializedFileReader::new(file).map_err(|e| refuse(&e))?;
+    let reader = SerializedFileReader::new(WholeFile(file.into())).map_err(|e| refuse(&e))?;
+    check_places(reader.metadata(), length).map_err(|e| e.file(source.as_str()))?;
     let metadata = reader.metadata().file_metadata();
     let mut log = Log { source, ..Log::default() };
     for KeyValue { key, value } in metadata.key_value_metadata().into_iter().flatten() {
@@ -71,6 +87,24 @@ pub(super) fn read(path: &Path, meant: &Columns) -> Result<Log, InputError> {
         return Err(InputError::in_file(path, "has no samples").allowed("one row a sample"));
     }
     Ok(log)
+}
+
+/// Every column chunk lies within the file's `bytes`: the library asserts it, or does not look.
+fn check_places(metadata: &ParquetMetaData, bytes: u64) -> Result<(), InputError> {
+    for (nth, group) in metadata.row_groups().iter().enumerate() {
+        for chunk in group.columns() {
+            let begin = chunk.dictionary_page_offset().unwrap_or_else(|| chunk.data_page_offset());
+            let length = chunk.compressed_size();
+            let end = begin.checked_add(length).and_then(|end| u64::try_from(end).ok());
+            if begin < 0 || length < 0 || end.is_none_or(|end| end > bytes) {
+                let problem = format!("damaged: row group {nth} says {length} bytes at {begin}");
+                return Err(InputError::new(problem)
+                    .key(chunk.column_path().string())
+                    .allowed(format!("within the file's {bytes} bytes")));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Cells of a column as they come: numbers, or strings; `None` is a null.
@@ -142,7 +176,8 @@ fn read_column<T: DataType>(
     rows: usize,
     mut take: impl FnMut(Option<&T::T>),
 ) -> Result<(), ParquetError> {
-    let (mut values, mut levels) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
+    let room = rows.min(FIRST_ROWS);
+    let (mut values, mut levels) = (Vec::with_capacity(room), Vec::with_capacity(room));
     let mut done = 0;
     while done < rows {
         let (records, ..) = reader.read_records(rows - done, Some(&mut levels), None, &mut values)?;

@@ -22,6 +22,8 @@ pub mod rig_file;
 pub mod signal;
 pub mod strain_gauges;
 pub mod toml_tree;
+#[cfg(feature = "parquet")]
+mod whole_file;
 
 /// In place of a form of file that the build leaves out.
 #[cfg(not(feature = "mcap"))]

@@ -3,10 +3,20 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
+/// In the path of every source file of the library.
+const LIBRARY: &str = "/parquet-";
+
 /// In memory where there is such a place.
 static FILE: LazyLock<PathBuf> = LazyLock::new(|| {
     let memory = PathBuf::from("/dev/shm");
     let folder = if memory.is_dir() { memory } else { std::env::temp_dir() };
+    // The fuzzer ends the process at any panic; the library's own, which the reader has to catch, must reach it.
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !panic.location().is_some_and(|place| place.file().contains(LIBRARY)) {
+            report(panic);
+        }
+    }));
     folder.join(format!("rig-fuzz-{}.parquet", std::process::id()))
 });
 
