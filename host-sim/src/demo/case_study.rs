@@ -75,6 +75,27 @@ impl CaseStudy {
             percent(self.diagnosis.extended.noise_floor_nrmse)
         )
     }
+
+    /// Parameters of the causes as found, and as they are on the disc.
+    ///
+    /// # Errors
+    /// The assumed model is damaged.
+    pub fn parameters(&self) -> Result<String, InputError> {
+        let rubber = ModelFile::assumed(&[])?;
+        let found = self.diagnosis.causes.iter().flat_map(|cause| &cause.parameters);
+        let words = found.filter_map(|(name, parameter)| {
+            let (_, truth) = rubber.parameters().find(|(own, _)| own == name)?;
+            let off = 100.0 * (parameter.value / truth - 1.0);
+            Some(format!("{name} {} for {truth} ({off:+.0} %)", rounded(parameter.value)))
+        });
+        Ok(words.collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// To three digits.
+fn rounded(value: f64) -> f64 {
+    let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
+    if unit > 0.0 { (value / unit).round() * unit } else { value }
 }
 
 /// The assumed rubber's bristles without its block.

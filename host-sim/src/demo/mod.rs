@@ -50,6 +50,12 @@ pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputE
         "what LuGre lacks in figs. 18–21",
         case_study.found()
     ));
+    table.push_str(&format!(
+        "{:<8} {:<53} {}\n",
+        "",
+        "its parameters, found for true",
+        case_study.parameters()?
+    ));
     Ok(Demo { runs, case_study, page, table })
 }
 

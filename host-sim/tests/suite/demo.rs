@@ -137,6 +137,16 @@ mod long {
 
     #[test]
     #[ignore = "long: cargo verify runs it"]
+    fn the_readme_shows_what_the_demo_prints() {
+        let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
+        let readme = std::fs::read_to_string(readme).unwrap();
+        let printed = readme.split("figure   what must").nth(1).unwrap().split("\n\nreport:").next().unwrap();
+        let (made, _) = made();
+        assert_eq!(made.table.trim_end(), format!("figure   what must{printed}"));
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
     fn the_demo_tells_the_models_apart_and_remakes_the_figure_of_the_readme_byte_by_byte() {
         let (made, progress) = made();
         assert!(
@@ -178,6 +188,6 @@ mod long {
         }
         // It loads fast enough only while it stays small.
         assert!(html.len() < 12_000_000, "{} bytes", html.len());
-        assert_eq!(made.table.lines().count(), 11);
+        assert_eq!(made.table.lines().count(), 12);
     }
 }
