@@ -72,6 +72,12 @@ impl Pty {
         self.lost_bytes
     }
 
+    /// Whether a host is there that has not read what was sent: the system's buffer is full.
+    #[must_use]
+    pub fn is_behind(&self) -> bool {
+        self.host_there && !self.waiting.is_empty()
+    }
+
     /// Opens the other end for a moment: no echo, no line editing, nothing left unread. Afterwards the system tells
     /// whether a host is there.
     fn tidy(&self) -> rustix::io::Result<()> {
@@ -224,8 +230,10 @@ mod tests {
         let mut pty = Pty::open().unwrap();
         let _silent = std::fs::File::options().read(true).write(true).open(pty.path()).unwrap();
         pty.look();
+        assert!(!pty.is_behind());
         let chunk = [0x55; 4096];
         (0..1000).for_each(|_| pty.send(&chunk));
         assert!(pty.lost_bytes() > 3_000_000, "{}", pty.lost_bytes());
+        assert!(pty.is_behind());
     }
 }
