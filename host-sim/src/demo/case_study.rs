@@ -13,6 +13,7 @@ use crate::identify::command::{Written, diagnose};
 use crate::identify::results::Diagnosis;
 use crate::input_error::InputError;
 use crate::report::Block;
+use crate::report::value::with_uncertainty;
 
 /// Ticks from one logged sample to the next.
 const EVERY: usize = 10;
@@ -86,16 +87,11 @@ impl CaseStudy {
         let words = found.filter_map(|(name, parameter)| {
             let (_, truth) = rubber.parameters().find(|(own, _)| own == name)?;
             let off = 100.0 * (parameter.value / truth - 1.0);
-            Some(format!("{name} {} for {truth} ({off:+.0} %)", rounded(parameter.value)))
+            let value = with_uncertainty(parameter.value, parameter.std.unwrap_or_default());
+            Some(format!("{name} {value} for {truth} ({off:+.0} %)"))
         });
         Ok(words.collect::<Vec<_>>().join(", "))
     }
-}
-
-/// To three digits.
-fn rounded(value: f64) -> f64 {
-    let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
-    if unit > 0.0 { (value / unit).round() * unit } else { value }
 }
 
 /// The assumed rubber's bristles without its block.

@@ -44,18 +44,12 @@ pub fn demo(mut progress: impl FnMut(usize, usize, &str)) -> Result<Demo, InputE
     progress(runs::STEPS, runs::STEPS, "report");
     let page = page(&runs, &case_study, axes?);
     let mut table = terminal_table(&runs);
-    table.push_str(&format!(
-        "{:<8} {:<53} {}\n",
-        "hidden",
-        "what LuGre lacks in figs. 18–21",
-        case_study.found()
-    ));
-    table.push_str(&format!(
-        "{:<8} {:<53} {}\n",
-        "",
-        "its parameters, found for true",
-        case_study.parameters()?
-    ));
+    for (name, what, found) in [
+        ("hidden", "what LuGre lacks in figs. 18–21", case_study.found()),
+        ("", "its parameters, found for true", case_study.parameters()?),
+    ] {
+        table.push_str(&format!("{name:<8} {what:<53} {found}\n"));
+    }
     Ok(Demo { runs, case_study, page, table })
 }
 

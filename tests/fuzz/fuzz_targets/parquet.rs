@@ -10,14 +10,20 @@ const LIBRARY: &str = "/parquet-";
 static FILE: LazyLock<PathBuf> = LazyLock::new(|| {
     let memory = PathBuf::from("/dev/shm");
     let folder = if memory.is_dir() { memory } else { std::env::temp_dir() };
-    // The fuzzer ends the process at any panic; the library's own, which the reader has to catch, must reach it.
+    folder.join(format!("rig-fuzz-{}.parquet", std::process::id()))
+});
+
+/// The fuzzer ends the process at any panic; the library's own, which the reader has to catch, must reach it.
+fn let_the_library_panic() {
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         if !panic.location().is_some_and(|place| place.file().contains(LIBRARY)) {
             report(panic);
         }
     }));
-    folder.join(format!("rig-fuzz-{}.parquet", std::process::id()))
-});
+}
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| rig_fuzz::readers::parquet(bytes, &FILE));
+libfuzzer_sys::fuzz_target!(
+    init: let_the_library_panic(),
+    |bytes: &[u8]| rig_fuzz::readers::parquet(bytes, &FILE)
+);
