@@ -119,6 +119,14 @@ impl Grid {
         }
     }
 
+    /// As [`Self::noise`] of a channel that may swing all the time.
+    pub fn white_noise(&self, values_on_grid: &[f64], values: &[f64]) -> f64 {
+        match &self.way {
+            Way::Between(_) => noise::white_deviation(values, 1.0),
+            _ => noise::white_deviation(values_on_grid, 1.0),
+        }
+    }
+
     /// Points of the grid that touch a marked sample of the log.
     pub fn touched(&self, marked: &[bool]) -> Vec<bool> {
         match &self.way {

@@ -1,5 +1,6 @@
 //! A contact log made ready for the observer of the slip.
 
+use super::ringing::Ringing;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
@@ -15,6 +16,10 @@ const BLEND: f64 = 12.0;
 /// Width over which the friction channel is smoothed before the slip is observed from it, samples: at a kilohertz 94 % of
 /// what rings at 120 Hz, as the load does, pass, and 6 % of what a torque ring of 600 Hz shows at 400.
 pub const OBSERVED_OVER: f64 = 1.2;
+
+/// Samples for each point of the grid from which on a log shows what swings from sample to sample: between samples that are
+/// further apart, interpolation stands.
+const LEAST_DENSITY: f64 = 0.8;
 
 /// Signals of a contact log on an even grid, SI units.
 #[derive(Debug, Clone)]
@@ -65,6 +70,8 @@ pub struct ContactLog {
     pub speed_noise_m_s: f64,
     /// How late the friction channel is by the rig file, samples.
     pub friction_late: f64,
+    /// What the friction channel swings with faster than a model can follow, where samples are regular enough to show it.
+    pub ringing: Option<Ringing>,
 }
 
 impl ContactLog {
@@ -82,7 +89,7 @@ impl ContactLog {
 
         let friction_nm = on_grid(signals.friction_torque_nm);
         let normal_n = on_grid(signals.normal_force_n);
-        let friction_noise_nm = grid.noise(&friction_nm, signals.friction_torque_nm);
+        let friction_noise_nm = grid.white_noise(&friction_nm, signals.friction_torque_nm);
         let normal_noise_n = grid.noise(&normal_n, signals.normal_force_n);
 
         let speed_column = log.signal(Signal::M2Speed).map(&on_grid);
@@ -100,6 +107,7 @@ impl ContactLog {
         let smooth_nm = gaussian(&friction_nm, 2.0, 0);
         let friction_change_nm = local_maximum(&magnitudes(&gradient(&smooth_nm)), 2);
 
+        let ringing = (grid.density > LEAST_DENSITY).then(|| Ringing::new(&friction_nm, friction_noise_nm));
         let mut usable = grid.covered.clone();
         // The observer's first state is a guess.
         usable.iter_mut().take(5).for_each(|u| *u = false);
@@ -108,6 +116,7 @@ impl ContactLog {
             root_speed_m_s: gaussian(&speed, 3.0, 0),
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
+            ringing,
             speed_noise_m_s: radius_m * speed_noise,
             m1_torque_nm: optional(Signal::M1Torque),
             m1_angle_rad: optional(Signal::M1Angle),
