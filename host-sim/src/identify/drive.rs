@@ -112,8 +112,7 @@ impl DriveLog {
     ) -> Self {
         let contact = friction.is_some();
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
-        let (angle_noise, effort_noise) =
-            (deviation_of(contact, &position, grid.density), deviation_of(contact, &effort, grid.density));
+        let (angle_noise, effort_noise) = (deviation_of(contact, &position), deviation_of(contact, &effort));
         let root_pi = std::f64::consts::PI.sqrt();
         let inertial = |width: f64| {
             inertia * angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2)
@@ -162,9 +161,9 @@ impl DriveLog {
 }
 
 /// Noise of a channel. Beside a contact it is what the channel shows in its quiet stretches; a drive alone may ripple
-/// all the time, so that only what is white counts; `band` is the share of the grid's frequencies that samples cover.
-fn deviation_of(contact: bool, values: &[f64], band: f64) -> f64 {
-    if contact { noise::standard_deviation(values) } else { noise::white_deviation(values, band) }
+/// all the time, so that only what changes from sample to sample counts.
+fn deviation_of(contact: bool, values: &[f64]) -> f64 {
+    if contact { noise::standard_deviation(values) } else { noise::difference_deviation(values) }
 }
 
 /// Usual sizes over the training logs.
@@ -281,8 +280,8 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let effort_change = largest_change(&log.effort, log.width);
     let friction_change =
         log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| largest_change(f, log.width));
-    let white = deviation_of(contact, &log.effort, log.grid.density)
-        .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f, log.grid.density)));
+    let white = deviation_of(contact, &log.effort)
+        .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
     let (white, form) = (white * white_share(log.width), LEAST_NOISE * scales.own);
     let noise = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
@@ -290,7 +289,7 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     };
     // What the derivative of a Gaussian lets through of white noise.
     let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
-    let speed_noise = deviation_of(contact, &log.position, log.grid.density) * passes / log.grid.step_s;
+    let speed_noise = deviation_of(contact, &log.position) * passes / log.grid.step_s;
     let standstill = (STANDSTILL * scales.speed).max(STANDSTILL_NOISES * speed_noise);
     let left_out = log.speed.iter().zip(&log.usable).map(|(v, used)| v.abs() < standstill || !used).collect();
     LogRows { width: log.width, step_s: log.grid.step_s, left_out, noise: Box::new(noise) }

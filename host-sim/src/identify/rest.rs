@@ -95,7 +95,9 @@ impl Ground {
         let used = &contact.ranked[0].fit.r;
         let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
         Self {
-            rows: (0..deviation.len()).filter(|i| deviation[*i] < limit && used[*i] != 0.0).collect(),
+            rows: (0..deviation.len())
+                .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && used[*i] != 0.0)
+                .collect(),
             white: contact
                 .logs
                 .iter()

@@ -17,10 +17,6 @@ const BLEND: f64 = 12.0;
 /// what rings at 120 Hz, as the load does, pass, and 6 % of what a torque ring of 600 Hz shows at 400.
 pub const OBSERVED_OVER: f64 = 1.2;
 
-/// Samples for each point of the grid from which on a log shows what swings from sample to sample: between samples that are
-/// further apart, interpolation stands.
-const LEAST_DENSITY: f64 = 0.8;
-
 /// Signals of a contact log on an even grid, SI units.
 #[derive(Debug, Clone)]
 pub struct ContactLog {
@@ -107,7 +103,7 @@ impl ContactLog {
         let smooth_nm = gaussian(&friction_nm, 2.0, 0);
         let friction_change_nm = local_maximum(&magnitudes(&gradient(&smooth_nm)), 2);
 
-        let ringing = (grid.density > LEAST_DENSITY).then(|| Ringing::new(&friction_nm, friction_noise_nm));
+        let ringing = grid.is_dense().then(|| Ringing::new(&friction_nm, friction_noise_nm));
         let mut usable = grid.covered.clone();
         // The observer's first state is a guess.
         usable.iter_mut().take(5).for_each(|u| *u = false);
