@@ -131,7 +131,7 @@ impl Grid {
     /// no part of the spectrum is noise alone.
     pub fn white_noise(&self, values_on_grid: &[f64], values: &[f64]) -> f64 {
         if self.is_dense() {
-            noise::white_deviation(values_on_grid, 1.0)
+            noise::white_deviation(values_on_grid)
         } else {
             self.noise(values_on_grid, values)
         }

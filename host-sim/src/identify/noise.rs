@@ -25,10 +25,10 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
 }
 
 /// As [`standard_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
-/// as noise: from the quietest part of its spectrum up to the share `band` of half the sampling rate.
-pub fn white_deviation(values: &[f64], band: f64) -> f64 {
+/// as noise: from the quietest part of its spectrum.
+pub fn white_deviation(values: &[f64]) -> f64 {
     let usual = standard_deviation(values);
-    Spectrum::new(values).map_or(usual, |spectrum| spectrum.white_deviation(band).min(usual))
+    Spectrum::new(values).map_or(usual, |spectrum| spectrum.white_deviation().min(usual))
 }
 
 /// As [`white_deviation`] by fourth differences, for a drive's own channels: their noise is not white, and the quietest part of
@@ -151,7 +151,7 @@ pub(super) mod tests {
                 .enumerate()
                 .map(|(i, e)| (omega * i as f64).sin() + 0.01 * e)
                 .collect();
-            let found = white_deviation(&values, 1.0);
+            let found = white_deviation(&values);
             assert!((found / 0.01 - 1.0).abs() < 0.1, "{omega}: {found}");
             if omega < 0.3 {
                 let found = difference_deviation(&values);

@@ -6,7 +6,6 @@ use super::contact::problem::{Fit, Problem, before_ringing};
 use super::contact::search;
 use super::filters::rms;
 use super::judge::{ContactPart, DiscCause};
-use super::noise;
 
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts, or where it swings as mains do.
 const BLOCKS_S: [f64; 2] = [0.05, 0.005];
@@ -76,7 +75,7 @@ pub struct Ground {
     deviation: Vec<f64>,
     /// White noise of the sensor alone, N m: what is left of it in a block is known.
     white: Vec<f64>,
-    /// The most that makes a single sample uncertain, N m.
+    /// The most that makes a single sample uncertain, N m; empty where points of the grid are no samples.
     named: Vec<f64>,
     /// Samples that are well known.
     rows: Vec<usize>,
@@ -93,17 +92,19 @@ impl Ground {
         let limit = problem.well_known_nm();
         let deviation = problem.noise.deviation.clone();
         let used = &contact.ranked[0].fit.r;
+        let dense = contact.logs.iter().all(|log| log.grid.is_dense());
         let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
         Self {
             rows: (0..deviation.len())
-                .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && used[*i] != 0.0)
+                .filter(|i| deviation[*i] < limit && used[*i] != 0.0)
+                .filter(|i| !dense || problem.noise.named(*i) < limit)
                 .collect(),
-            white: contact
-                .logs
-                .iter()
-                .flat_map(|log| vec![noise::white_deviation(&log.friction_nm, log.grid.density); log.len()])
-                .collect(),
-            named: (0..deviation.len()).map(|i| NAMED_WITHIN * problem.noise.named(i)).collect(),
+            white: contact.logs.iter().flat_map(|log| vec![log.white_noise_nm(); log.len()]).collect(),
+            named: if dense {
+                (0..deviation.len()).map(|i| NAMED_WITHIN * problem.noise.named(i)).collect()
+            } else {
+                Vec::new()
+            },
             signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
             blocks: blocks(step_s),
             deviation,
@@ -118,8 +119,8 @@ impl Ground {
     /// there.
     fn structured(&self, residual: &[f64]) -> (f64, f64) {
         let [long, short] = self.blocks.map(|block| structured(residual, &self.white, &self.rows, block));
-        let each = structured(residual, &self.named, &self.rows, 1);
-        [short, each].into_iter().fold(long, |most, other| if other.0 > most.0 { other } else { most })
+        let each = (!self.named.is_empty()).then(|| structured(residual, &self.named, &self.rows, 1));
+        [short].into_iter().chain(each).fold(long, |most, other| if other.0 > most.0 { other } else { most })
     }
 
     /// RMS of what a fit leaves beyond noise, over that of the signal.

@@ -49,13 +49,11 @@ impl Spectrum {
         Some(Self { step: 1.0 / segment as f64, density })
     }
 
-    /// Standard deviation of the white noise in it, from frequencies up to the share `band` of half the sampling rate: the
-    /// median density in that eighth of them which has least, since a line stands in one of them and what is slow in the
-    /// lowest.
-    pub fn white_deviation(&self, band: f64) -> f64 {
+    /// Standard deviation of the white noise in it: from the median density in that eighth of the frequencies which has least,
+    /// since a line stands in one of them and what is slow in the lowest.
+    pub fn white_deviation(&self) -> f64 {
         const BANDS: usize = 8;
         let used = &self.density[1..];
-        let used = &used[..((used.len() as f64 * band) as usize).clamp(BANDS, used.len())];
         let median = |part: &[f64]| {
             let mut sorted = part.to_vec();
             *sorted.select_nth_unstable_by(part.len() / 2, f64::total_cmp).1
@@ -115,7 +113,7 @@ mod tests {
     fn white_noise_is_measured_in_the_quietest_part_of_the_band() {
         for ring in [0.03, 0.12, 0.243, 0.31, 0.45] {
             for noise in [0.001, 0.01, 0.1] {
-                let found = Spectrum::new(&ringing(ring, noise)).expect("long enough").white_deviation(1.0);
+                let found = Spectrum::new(&ringing(ring, noise)).expect("long enough").white_deviation();
                 // The slow signal stands in the lowest eighth.
                 let least = (4..32).map(|n| density(f64::from(n) / 64.0, ring, noise));
                 let expected = least.fold(f64::INFINITY, f64::min).sqrt();

@@ -6,6 +6,7 @@ use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::identify::filters::{gaussian, gradient, local_maximum, shifted, smoothed_flat};
 use crate::identify::grid::Grid;
+use crate::identify::noise;
 use crate::input_error::InputError;
 use crate::predict::BridgeModel;
 
@@ -159,6 +160,15 @@ impl ContactLog {
         }
     }
 
+    /// White noise of the friction channel, N m: what is left of it in a block is known.
+    pub fn white_noise_nm(&self) -> f64 {
+        if self.grid.is_dense() {
+            noise::white_deviation(&self.friction_nm)
+        } else {
+            noise::difference_deviation(&self.friction_nm)
+        }
+    }
+
     /// Points of the grid.
     pub fn len(&self) -> usize {
         self.grid.len()
@@ -177,7 +187,7 @@ fn magnitudes(values: &[f64]) -> Vec<f64> {
 /// Angle of the disc from both columns, and the noise of its slope, rad/s.
 fn motion(grid: &Grid, speed: Option<&[f64]>, angle: Option<&[f64]>) -> (Vec<f64>, f64) {
     let step_s = grid.step_s;
-    let noise = |values: &[f64]| crate::identify::noise::standard_deviation(values);
+    let noise = |values: &[f64]| noise::standard_deviation(values);
     let slope_noise = |angle: &[f64]| std::f64::consts::SQRT_2 * noise(angle) / step_s;
     let integrated = |speed: &[f64]| {
         let mut sum = 0.0;

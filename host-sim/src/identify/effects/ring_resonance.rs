@@ -33,6 +33,10 @@ impl Effect for RingResonance {
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
+        // Between samples that are further apart than the grid's points no mode is seen.
+        if !view.logs.iter().all(|log| log.grid.is_dense()) {
+            return Vec::new();
+        }
         let parameters = vec![Parameter::logarithm("mode_hz", 100.0, 0.6), Parameter::logarithm("damping_ratio", 0.05, 0.7)];
         // A damped mode is as wide as a step of 6 %; one that rings is a peak of the channel's spectrum.
         let damped = (0..42).map(|i| (22.0 * 1.06f64.powi(i), 0.06));
