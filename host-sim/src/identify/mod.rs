@@ -22,6 +22,5 @@ pub mod normal_load;
 pub mod page;
 pub mod rest;
 pub mod results;
-pub mod spectrum;
 pub mod term;
 pub mod two_mass;

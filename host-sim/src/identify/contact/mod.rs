@@ -7,5 +7,4 @@ pub mod log;
 pub(in crate::identify) mod noise;
 pub mod observer;
 pub mod problem;
-mod ringing;
 pub mod search;
