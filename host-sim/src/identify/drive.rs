@@ -161,9 +161,9 @@ impl DriveLog {
 }
 
 /// Noise of a channel. Beside a contact it is what the channel shows in its quiet stretches; a drive alone may ripple
-/// all the time, so that only what is white counts.
+/// all the time, so that only what changes from sample to sample counts.
 fn deviation_of(contact: bool, values: &[f64]) -> f64 {
-    if contact { noise::standard_deviation(values) } else { noise::white_deviation(values) }
+    if contact { noise::standard_deviation(values) } else { noise::difference_deviation(values) }
 }
 
 /// Usual sizes over the training logs.

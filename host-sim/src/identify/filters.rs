@@ -25,6 +25,30 @@ pub fn smoothed_flat(values: &[f64], width: f64) -> Vec<f64> {
     convolved(values, &kernel(width, 0, true))
 }
 
+/// The input of a second-order mode (natural frequency in radians per sample, damping ratio) behind its output, smoothed as by
+/// [`smoothed_flat`]: (1 + 2ζ s/ω₀ + s²/ω₀²) times that filter, from its frequency response.
+///
+/// A mode that rings is a zero here, so what rings goes and what made it ring stays.
+pub fn before_mode(values: &[f64], omega: f64, damping_ratio: f64, width: f64) -> Vec<f64> {
+    /// Points of the integral over the frequency: the response is smooth over a hundredth of the band.
+    const POINTS: usize = 128;
+    // Its fourth derivative reaches half as far again as the Gaussian.
+    let half = (1.5 * REACH * width + 0.5) as isize;
+    let step = std::f64::consts::PI / POINTS as f64;
+    let weight = |place: isize| -> f64 {
+        let sum: f64 = (0..POINTS)
+            .map(|k| {
+                let w = (k as f64 + 0.5) * step;
+                let (x, r) = (0.5 * (width * w).powi(2), w / omega);
+                let (sin, cos) = (w * place as f64).sin_cos();
+                (1.0 + x) * (-x).exp() * ((1.0 - r * r) * cos + 2.0 * damping_ratio * r * sin)
+            })
+            .sum();
+        sum / POINTS as f64
+    };
+    convolved(values, &(-half..=half).map(weight).collect::<Vec<_>>())
+}
+
 /// A signal, mirrored beyond its ends, behind an even number of weights around each sample and that at it.
 fn convolved(values: &[f64], kernel: &[f64]) -> Vec<f64> {
     let n = values.len();
@@ -170,6 +194,7 @@ pub fn median_magnitude(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::predict::SecondOrder;
 
     #[test]
     fn flat_smoothing_passes_cubics_and_keeps_a_mode_that_the_gaussian_loses() {
@@ -184,6 +209,29 @@ mod tests {
         let kept = |smooth: Vec<f64>| rms(&smooth[50..150]) / rms(&mode[50..150]);
         assert!((0.95..0.99).contains(&kept(smoothed_flat(&mode, 1.0))));
         assert!(kept(gaussian(&mode, 1.0, 0)) < 0.78);
+    }
+
+    #[test]
+    fn what_a_mode_was_struck_by_is_found_behind_its_ringing() {
+        // Struck every 500 samples; the mode moves in steps of a tenth of a sample.
+        let struck = |t: f64| (0.02 * t).sin() + if (t / 500.0).floor() % 2.0 > 0.0 { 1.0 } else { 0.0 };
+        for (omega, width) in [(0.14, 3.5), (0.4, 1.6), (1.53, 1.2)] {
+            let mut mode = SecondOrder::new(omega / std::f64::consts::TAU, 0.005, struck(0.0));
+            let shown: Vec<f64> = (0..3000)
+                .map(|i| {
+                    let fine =
+                        (1..=10).map(|j| mode.step(0.1, struck(f64::from(i) + 0.1 * f64::from(j) - 1.0)));
+                    fine.last().unwrap_or_default()
+                })
+                .collect();
+            let input: Vec<f64> = (0..3000).map(|i| struck(f64::from(i))).collect();
+            let off = |found: &[f64]| {
+                let away = (20..2980).filter(|i| (i + 20) % 500 > 40);
+                rms(&away.map(|i| found[i] - input[i]).collect::<Vec<_>>())
+            };
+            let found = before_mode(&shown, omega, 0.005, width);
+            assert!(off(&shown) > 0.2 && off(&found) < 0.004, "{omega}: {} {}", off(&shown), off(&found));
+        }
     }
 
     #[test]

@@ -177,9 +177,7 @@ pub fn identify(
     let starts_agreeing = found.iter().filter(|fit| fit.cost < best.cost + SAME_OPTIMUM).count();
 
     // The noise model begins with slopes and transitions of the numbers found, not of the file's.
-    let mut there = baseline.clone();
-    there.free.iter_mut().zip(&best.p).for_each(|(base, p)| base.parameter.mean = *p);
-    problem.noise = Problem::new(&logs, &there, &[]).noise;
+    problem.noise = problem.noise_at(&[], &best.p);
     let mut fit = converged(&problem, best.p.clone(), ROUNDS, progress);
     for _ in 0..2 {
         problem.noise.refit(&logs, &fit.r);

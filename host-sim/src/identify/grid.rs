@@ -13,6 +13,9 @@ pub const STEP_S: f64 = 1e-3;
 /// A distance between samples of more than so many median steps is a gap.
 const GAP_STEPS: f64 = 4.0;
 
+/// Samples for each point of the grid from which on they are about as close as its points.
+const LEAST_DENSITY: f64 = 0.8;
+
 /// How samples are brought to the grid.
 #[derive(Debug, Clone)]
 pub struct Grid {
@@ -116,6 +119,21 @@ impl Grid {
         match &self.way {
             Way::Between(_) => noise::standard_deviation(values),
             _ => noise::standard_deviation(values_on_grid),
+        }
+    }
+
+    /// Whether samples are about as close as the grid's points, so that a log shows what swings from sample to sample.
+    pub fn is_dense(&self) -> bool {
+        self.density > LEAST_DENSITY
+    }
+
+    /// As [`Self::noise`] of a channel that may swing all the time. Where samples are further apart a signal fills its band, and
+    /// no part of the spectrum is noise alone.
+    pub fn white_noise(&self, values_on_grid: &[f64], values: &[f64]) -> f64 {
+        if self.is_dense() {
+            noise::white_deviation(values_on_grid)
+        } else {
+            self.noise(values_on_grid, values)
         }
     }
 

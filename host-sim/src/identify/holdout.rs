@@ -144,9 +144,13 @@ fn contact_errors(contact: &ContactPart, place: usize, logs: &[ContactLog], trai
         return Errors::default();
     };
     let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map_or(fit, |r| &r.fit);
-    let problem = Problem::new(logs, &contact.baseline, &terms);
-    let base = problem.predict(&none.terms, &none.p).shown_nm;
-    let extended = problem.predict(&own_terms, &fit.p).shown_nm;
+    let mut problem = Problem::new(logs, &contact.baseline, &terms);
+    problem.noise = problem.noise_at(&own_terms, &fit.p);
+    let left = |terms: &[usize], p: &[f64]| {
+        let shown = problem.predict(terms, p).shown_nm;
+        problem.noise.innovations(problem.measured().zip(shown).map(|(y, x)| y - x).collect())
+    };
+    let (base, extended) = (left(&none.terms, &none.p), left(&own_terms, &fit.p));
     let mut errors = Errors::default();
     let mut at = 0;
     // Bristles at rest and the instants at which they break away show no law.
@@ -154,14 +158,11 @@ fn contact_errors(contact: &ContactPart, place: usize, logs: &[ContactLog], trai
     for log in logs {
         let points: Vec<Point> = (0..log.len())
             .filter(|i| log.usable[*i] && problem.noise.named(at + *i) < limit)
-            .map(|i| {
-                let y = log.friction_nm[i];
-                Point {
-                    signal: y,
-                    base: y - base[at + i],
-                    extended: y - extended[at + i],
-                    noise: problem.noise.named(at + i),
-                }
+            .map(|i| Point {
+                signal: log.friction_nm[i],
+                base: base[at + i],
+                extended: extended[at + i],
+                noise: problem.noise.named(at + i),
             })
             .collect();
         errors.add(&log.source, &points, log.grid.step_s);

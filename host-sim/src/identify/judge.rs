@@ -456,6 +456,7 @@ fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64)
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
     let ground = rest::Ground::new(contact);
+    let problem = contact.problem();
     let mut out = Vec::new();
     for (place, (ranked, sizes)) in contact.ranked.iter().zip(&contact.sizes).enumerate() {
         let fit = &ranked.fit;
@@ -467,7 +468,7 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
             log_evidence: ranked.log_evidence,
             place,
             sizes: effects.iter().map(|e| e.1).collect(),
-            floor: MODEL_FORM.max(LEFT_SHARE * ground.size(&fit.r)),
+            floor: MODEL_FORM.max(LEFT_SHARE * ground.size(&problem, fit)),
         });
     }
     out

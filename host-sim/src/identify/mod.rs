@@ -22,5 +22,6 @@ pub mod normal_load;
 pub mod page;
 pub mod rest;
 pub mod results;
+pub mod spectrum;
 pub mod term;
 pub mod two_mass;

@@ -6,6 +6,8 @@
 //! swings in every window counts as noise here; that is the honest side for a threshold.
 //! Left out: noise that changes along the record.
 
+use super::spectrum::Spectrum;
+
 /// Samples of a window.
 pub const WINDOW: usize = 48;
 /// Share of windows taken as quiet.
@@ -22,9 +24,16 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
     quiet_deviation(values).max(resolution)
 }
 
-/// As [`standard_deviation`] for a channel whose noise is white: by fourth differences, so that a signal that swings in
-/// every window, up to a tenth of the sampling rate, does not count as noise.
+/// As [`standard_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
+/// as noise: from the quietest part of its spectrum.
 pub fn white_deviation(values: &[f64]) -> f64 {
+    let usual = standard_deviation(values);
+    Spectrum::new(values).map_or(usual, |spectrum| spectrum.white_deviation().min(usual))
+}
+
+/// As [`white_deviation`] by fourth differences, for a drive's own channels: their noise is not white, and the quietest part of
+/// its spectrum says less than what it does from sample to sample. What swings near a quarter of the sampling rate counts.
+pub fn difference_deviation(values: &[f64]) -> f64 {
     // Sum of the squared binomial coefficients 1, 4, 6, 4, 1.
     const SQUARES: f64 = 70.0;
     let differences: Vec<f64> =
@@ -136,11 +145,20 @@ pub(super) mod tests {
 
     #[test]
     fn a_swing_in_every_window_is_no_white_noise() {
-        let values: Vec<f64> =
-            white(20_000, 3).iter().enumerate().map(|(i, e)| (0.2 * i as f64).sin() + 0.01 * e).collect();
-        let found = white_deviation(&values);
-        assert!((found / 0.01 - 1.0).abs() < 0.1, "{found}");
-        assert!(standard_deviation(&values) > 0.1);
+        for omega in [0.2, 1.5, 2.6] {
+            let values: Vec<f64> = white(20_000, 3)
+                .iter()
+                .enumerate()
+                .map(|(i, e)| (omega * i as f64).sin() + 0.01 * e)
+                .collect();
+            let found = white_deviation(&values);
+            assert!((found / 0.01 - 1.0).abs() < 0.1, "{omega}: {found}");
+            if omega < 0.3 {
+                let found = difference_deviation(&values);
+                assert!((found / 0.01 - 1.0).abs() < 0.1, "{omega}: {found}");
+            }
+            assert!(standard_deviation(&values) > 0.1);
+        }
     }
 
     #[test]

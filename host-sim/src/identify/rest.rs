@@ -2,13 +2,15 @@
 
 use super::balance::Balance;
 use super::contact::noise::MODEL_FORM;
+use super::contact::problem::{Fit, Problem, before_ringing};
 use super::contact::search;
 use super::filters::rms;
 use super::judge::{ContactPart, DiscCause};
-use super::noise;
 
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts, or where it swings as mains do.
 const BLOCKS_S: [f64; 2] = [0.05, 0.005];
+/// Deviations from named sources are known within this factor before anything is fitted to the residuals.
+const NAMED_WITHIN: f64 = 1.5;
 /// A rest is beyond the form of a model where it is this many times [`MODEL_FORM`] of the signal: what a wrong law leaves.
 const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
@@ -67,18 +69,14 @@ fn blocks(step_s: f64) -> [usize; 2] {
     BLOCKS_S.map(|s| (s / step_s).round().max(1.0) as usize)
 }
 
-/// The larger of what is structured over long blocks and over short ones, with what noise leaves there.
-fn larger(residual: &[f64], noise: &[f64], rows: &[usize], blocks: [usize; 2]) -> (f64, f64) {
-    let [long, short] = blocks.map(|block| structured(residual, noise, rows, block));
-    if short.0 > long.0 { short } else { long }
-}
-
 /// What the rests of the contact's balance are measured with.
 pub struct Ground {
     /// Deviations of the noise model, N m.
     deviation: Vec<f64>,
-    /// The sensor's alone, N m.
-    noise: Vec<f64>,
+    /// White noise of the sensor alone, N m: what is left of it in a block is known.
+    white: Vec<f64>,
+    /// The most that makes a single sample uncertain, N m; empty where points of the grid are no samples.
+    named: Vec<f64>,
     /// Samples that are well known.
     rows: Vec<usize>,
     /// Samples in the blocks.
@@ -94,15 +92,19 @@ impl Ground {
         let limit = problem.well_known_nm();
         let deviation = problem.noise.deviation.clone();
         let used = &contact.ranked[0].fit.r;
+        let dense = contact.logs.iter().all(|log| log.grid.is_dense());
         let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
         Self {
-            rows: (0..deviation.len()).filter(|i| deviation[*i] < limit && used[*i] != 0.0).collect(),
-            // White noise alone: what swings is no noise here.
-            noise: contact
-                .logs
-                .iter()
-                .flat_map(|log| vec![noise::white_deviation(&log.friction_nm); log.len()])
+            rows: (0..deviation.len())
+                .filter(|i| deviation[*i] < limit && used[*i] != 0.0)
+                .filter(|i| !dense || problem.noise.named(*i) < limit)
                 .collect(),
+            white: contact.logs.iter().flat_map(|log| vec![log.white_noise_nm(); log.len()]).collect(),
+            named: if dense {
+                (0..deviation.len()).map(|i| NAMED_WITHIN * problem.noise.named(i)).collect()
+            } else {
+                Vec::new()
+            },
             signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
             blocks: blocks(step_s),
             deviation,
@@ -113,9 +115,32 @@ impl Ground {
         r.iter().zip(&self.deviation).map(|(r, s)| r * s).collect()
     }
 
-    /// RMS of what residuals (over their deviations) have beyond noise, over that of the signal.
-    pub fn size(&self, r: &[f64]) -> f64 {
-        larger(&self.in_units(r), &self.noise, &self.rows, self.blocks).0.sqrt() / self.signal
+    /// What is structured over long blocks, short ones or from sample to sample, whichever is most, with what noise leaves
+    /// there.
+    fn structured(&self, residual: &[f64]) -> (f64, f64) {
+        let [long, short] = self.blocks.map(|block| structured(residual, &self.white, &self.rows, block));
+        let each = (!self.named.is_empty()).then(|| structured(residual, &self.named, &self.rows, 1));
+        [short].into_iter().chain(each).fold(long, |most, other| if other.0 > most.0 { other } else { most })
+    }
+
+    /// RMS of what a fit leaves beyond noise, over that of the signal.
+    pub fn size(&self, problem: &Problem<'_>, fit: &Fit) -> f64 {
+        self.structured(&self.left(problem, fit)).0.sqrt() / self.signal
+    }
+
+    /// What a fit leaves, N m; before the sensor's mode, where it rings: what strikes it between two samples is not known
+    /// better than to a part of a period, and what then rings is no more than the same error once again.
+    fn left(&self, problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+        let Some(mode) = problem.change(&fit.terms, &fit.p).mode else { return self.in_units(&fit.r) };
+        let shown = problem.predict(&fit.terms, &fit.p).shown_nm;
+        let mut from = 0;
+        let each = problem.logs.iter().flat_map(|log| {
+            let own = from..from + log.len();
+            from = own.end;
+            let residual: Vec<f64> = log.friction_nm.iter().zip(&shown[own]).map(|(y, x)| y - x).collect();
+            before_ringing(&residual, mode, log.grid.step_s).unwrap_or(residual)
+        });
+        each.collect()
     }
 }
 
@@ -133,19 +158,15 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         explained.push(search::difference(&problem, none, as_logged));
     }
     let ground = Ground::new(contact);
-    let (rows, blocks) = (&ground.rows, ground.blocks);
-    let residual = ground.in_units(&fit.r);
-    let (rest, left) = larger(&residual, &ground.noise, rows, blocks);
-    let before = as_logged
-        .as_ref()
-        .or(none)
-        .map_or(rest, |none| larger(&ground.in_units(none), &ground.noise, rows, blocks).0);
+    let residual = ground.left(&problem, fit);
+    let (rest, left) = ground.structured(&residual);
+    let before = as_logged.as_ref().or(none).map_or(rest, |none| ground.structured(&ground.in_units(none)).0);
     Rest {
         size: rest.sqrt() / ground.signal,
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
         times_noise: rest / left.max(1e-300),
-        follows: follows(&residual, rows, blocks[0], &contact_quantities(contact)),
+        follows: follows(&residual, &ground.rows, ground.blocks[0], &contact_quantities(contact)),
     }
 }
 

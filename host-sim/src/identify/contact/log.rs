@@ -1,10 +1,12 @@
 //! A contact log made ready for the observer of the slip.
 
+use super::ringing::Ringing;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::identify::filters::{gaussian, gradient, local_maximum, shifted, smoothed_flat};
 use crate::identify::grid::Grid;
+use crate::identify::noise;
 use crate::input_error::InputError;
 use crate::predict::BridgeModel;
 
@@ -65,6 +67,8 @@ pub struct ContactLog {
     pub speed_noise_m_s: f64,
     /// How late the friction channel is by the rig file, samples.
     pub friction_late: f64,
+    /// What the friction channel swings with faster than a model can follow, where samples are regular enough to show it.
+    pub ringing: Option<Ringing>,
 }
 
 impl ContactLog {
@@ -82,7 +86,7 @@ impl ContactLog {
 
         let friction_nm = on_grid(signals.friction_torque_nm);
         let normal_n = on_grid(signals.normal_force_n);
-        let friction_noise_nm = grid.noise(&friction_nm, signals.friction_torque_nm);
+        let friction_noise_nm = grid.white_noise(&friction_nm, signals.friction_torque_nm);
         let normal_noise_n = grid.noise(&normal_n, signals.normal_force_n);
 
         let speed_column = log.signal(Signal::M2Speed).map(&on_grid);
@@ -100,6 +104,7 @@ impl ContactLog {
         let smooth_nm = gaussian(&friction_nm, 2.0, 0);
         let friction_change_nm = local_maximum(&magnitudes(&gradient(&smooth_nm)), 2);
 
+        let ringing = grid.is_dense().then(|| Ringing::new(&friction_nm, friction_noise_nm));
         let mut usable = grid.covered.clone();
         // The observer's first state is a guess.
         usable.iter_mut().take(5).for_each(|u| *u = false);
@@ -108,6 +113,7 @@ impl ContactLog {
             root_speed_m_s: gaussian(&speed, 3.0, 0),
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
+            ringing,
             speed_noise_m_s: radius_m * speed_noise,
             m1_torque_nm: optional(Signal::M1Torque),
             m1_angle_rad: optional(Signal::M1Angle),
@@ -154,6 +160,15 @@ impl ContactLog {
         }
     }
 
+    /// White noise of the friction channel, N m: what is left of it in a block is known.
+    pub fn white_noise_nm(&self) -> f64 {
+        if self.grid.is_dense() {
+            noise::white_deviation(&self.friction_nm)
+        } else {
+            noise::difference_deviation(&self.friction_nm)
+        }
+    }
+
     /// Points of the grid.
     pub fn len(&self) -> usize {
         self.grid.len()
@@ -172,7 +187,7 @@ fn magnitudes(values: &[f64]) -> Vec<f64> {
 /// Angle of the disc from both columns, and the noise of its slope, rad/s.
 fn motion(grid: &Grid, speed: Option<&[f64]>, angle: Option<&[f64]>) -> (Vec<f64>, f64) {
     let step_s = grid.step_s;
-    let noise = |values: &[f64]| crate::identify::noise::standard_deviation(values);
+    let noise = |values: &[f64]| noise::standard_deviation(values);
     let slope_noise = |angle: &[f64]| std::f64::consts::SQRT_2 * noise(angle) / step_s;
     let integrated = |speed: &[f64]| {
         let mut sum = 0.0;

@@ -7,4 +7,5 @@ pub mod log;
 pub(in crate::identify) mod noise;
 pub mod observer;
 pub mod problem;
+mod ringing;
 pub mod search;

@@ -11,12 +11,16 @@
 //! | noise of the slip speed | through g′, where the tip slips |
 //! | noise of the root's motion | through the stiffness, where it sticks |
 //! | transitions | 3 % of the load near a change between slip and stick |
+//!
+//! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
+//! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::law::Curve;
 use super::log::ContactLog;
 use super::problem::{FREEDOM, Prediction};
+use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
 use crate::identify::linear;
 
@@ -40,6 +44,10 @@ pub struct Noise {
     pub deviation: Vec<f64>,
     /// n² of each source for each sample.
     sources: Vec<[f64; SOURCES]>,
+    /// The filter of what swings in each log with the present deviations, and the log's length.
+    filters: Vec<(Option<Filter>, usize)>,
+    /// Deviations before anything is fitted, the form of the model left out.
+    named: Vec<f64>,
     /// Samples that count as one: the spectral density of the residuals below 30 Hz over their variance.
     pub temper: f64,
     /// The sensor's factor a, as fitted.
@@ -97,21 +105,49 @@ impl Noise {
             }
         }
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
-        let mut noise = Self { deviation: Vec::new(), sources, temper: 3.0 / density, sensor_factor: 1.0 };
-        noise.weigh(&[1.0; SOURCES]);
+        let mut noise = Self { sources, temper: 3.0 / density, sensor_factor: 1.0, ..Self::default() };
+        let mut factors = [1.0; SOURCES];
+        factors[MODEL_FORM_SOURCE] = 0.0;
+        noise.weigh(logs, &factors);
+        noise.named = std::mem::take(&mut noise.deviation);
+        noise.weigh(logs, &[1.0; SOURCES]);
         noise
     }
 
     /// Deviation of a sample from its named sources before anything is fitted, the form of the model left out: what noise
     /// alone leaves.
     pub fn named(&self, sample: usize) -> f64 {
-        let n = &self.sources[sample];
-        n.iter().enumerate().filter(|(s, _)| *s != MODEL_FORM_SOURCE).map(|(_, n)| n).sum::<f64>().sqrt()
+        self.named[sample]
     }
 
-    fn weigh(&mut self, factors: &[f64; SOURCES]) {
-        let sum = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>();
-        self.deviation = self.sources.iter().map(|n| sum(n).max(1e-24).sqrt()).collect();
+    fn weigh(&mut self, logs: &[ContactLog], factors: &[f64; SOURCES]) {
+        let sum = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
+        let mut variance: Vec<f64> = self.sources.iter().map(sum).collect();
+        let mut from = 0;
+        self.filters.clear();
+        for log in logs {
+            let own = &mut variance[from..from + log.len()];
+            from += log.len();
+            let filter = log.ringing.as_ref().map(|ringing| ringing.filter(own, &log.usable));
+            if let Some(filter) = &filter {
+                own.iter_mut().zip(&filter.rung).for_each(|(variance, rung)| *variance += rung);
+            }
+            self.filters.push((filter, log.len()));
+        }
+        self.deviation = variance.into_iter().map(f64::sqrt).collect();
+    }
+
+    /// Measured less predicted, without what the channel was seen to swing with; all logs on end, N m.
+    pub fn innovations(&self, mut residual: Vec<f64>) -> Vec<f64> {
+        let mut from = 0;
+        for (filter, count) in &self.filters {
+            let own = from..from + count;
+            from = own.end;
+            if let Some(filter) = filter {
+                filter.innovations(&mut residual[own]);
+            }
+        }
+        residual
     }
 
     /// Fits the sources' factors to residuals (over the present deviations) and takes the effective sample size from
@@ -119,6 +155,10 @@ impl Noise {
     pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
         let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
+        let rung = |(filter, count): &(Option<Filter>, usize)| {
+            filter.as_ref().map_or_else(|| vec![0.0; *count], |filter| filter.rung.clone())
+        };
+        let rung: Vec<f64> = self.filters.iter().flat_map(rung).collect();
         let mut factors = [1.0; SOURCES];
         // A prior of 0.2 % of the samples at a factor of one.
         let strength = 2e-3 * used.len() as f64;
@@ -129,9 +169,9 @@ impl Noise {
             let (mut h, mut g) = (DMatrix::<f64>::zeros(SOURCES, SOURCES), DVector::<f64>::zeros(SOURCES));
             for (&i, &y) in used.iter().zip(&square) {
                 let n = &self.sources[i];
-                let v = n.iter().zip(&factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
+                let v = n.iter().zip(&factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24) + rung[i];
                 // Beyond three deviations a residual is the tail's; the cut costs 15 % of a Gaussian's variance.
-                let y = y.min(9.0 * v) * 1.15;
+                let y = y.min(9.0 * v) * 1.15 - rung[i];
                 for a in 0..SOURCES {
                     g[a] += n[a] * y / (v * v);
                     for b in 0..=a {
@@ -153,7 +193,7 @@ impl Noise {
         }
         self.sensor_factor = factors[0];
         let before = std::mem::take(&mut self.deviation);
-        self.weigh(&factors);
+        self.weigh(logs, &factors);
         // Influence of each residual on a slow parameter.
         let pull: Vec<f64> = r
             .iter()

@@ -12,7 +12,7 @@ use super::law::{Contact, Curve};
 use super::log::{ContactLog, OBSERVED_OVER};
 pub use super::noise::Noise;
 use super::observer::{Drive, Observed, SLIP_NOISES, observe};
-use crate::identify::filters::{gaussian, rms, shifted, smoothed_flat};
+use crate::identify::filters::{before_mode, rms, shifted, smoothed_flat};
 use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
 use crate::predict::SecondOrder;
@@ -29,6 +29,24 @@ const DRIFT: f64 = 5e-4;
 const WELL_KNOWN: f64 = 0.1;
 /// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
 const SIMULATED_MODE: f64 = 0.25;
+
+/// White noise of the channel is at most some twice as large in the force before a mode: 0.9/(ω² w^2.5) for ω in radians per
+/// sample behind a filter of width w.
+const DEVIATION_BEFORE_MODE: f64 = 0.45;
+
+fn rings(hz: f64, step_s: f64) -> bool {
+    hz * step_s < SIMULATED_MODE
+}
+
+/// What a mode (Hz, damping ratio) of the sensor was driven by, from what it shows; `None` where it is too fast to ring from
+/// sample to sample.
+pub fn before_ringing(shown: &[f64], (hz, zeta): (f64, f64), step_s: f64) -> Option<Vec<f64>> {
+    rings(hz, step_s).then(|| {
+        let omega = std::f64::consts::TAU * hz * step_s;
+        let width = (DEVIATION_BEFORE_MODE / (omega * omega)).powf(0.4).max(OBSERVED_OVER);
+        before_mode(shown, omega, zeta, width)
+    })
+}
 
 /// Which number of the contact a baseline parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,10 +194,16 @@ impl<'a> Problem<'a> {
     pub fn new(logs: &'a [ContactLog], baseline: &'a Baseline, terms: &'a [ContactTerm]) -> Self {
         let start: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
         let mut problem = Self { logs, baseline, terms, noise: Noise::default() };
-        let contact = problem.contact(&baseline.numbers(&start), &Change::default());
-        let prediction = problem.predict(&[], &start);
-        problem.noise = Noise::new(logs, &contact.curve, contact.stiffness_n_per_m, &prediction);
+        problem.noise = problem.noise_at(&[], &start);
         problem
+    }
+
+    /// The noise model, not fitted, with the slopes, transitions and jumps of a hypothesis.
+    pub fn noise_at(&self, terms: &[usize], p: &[f64]) -> Noise {
+        let change = self.change(terms, p);
+        let contact = self.contact(&self.baseline.numbers(p), &change);
+        let prediction = self.predict_changed(&change, p);
+        Noise::new(self.logs, &contact.curve, contact.stiffness_n_per_m, &prediction)
     }
 
     /// With a noise model that was fitted before.
@@ -245,7 +269,7 @@ impl<'a> Problem<'a> {
         for (at, log) in self.logs.iter().enumerate() {
             let step_s = log.grid.step_s;
             let late = (1e-3 * numbers.late_ms + change.late_s) / step_s;
-            let ringing = change.mode.filter(|(hz, _)| hz * step_s < SIMULATED_MODE);
+            let ringing = change.mode.filter(|(hz, _)| rings(*hz, step_s));
             // What the channel adds is taken off first, so that it changes the observed slip too.
             let seen = match (&change.shown_nm, ringing) {
                 (None, None) => shifted(&log.observed_nm, log.friction_late + late),
@@ -254,15 +278,9 @@ impl<'a> Problem<'a> {
                     if let Some(added) = added {
                         seen.iter_mut().zip(&added[at]).for_each(|(x, a)| *x -= a);
                     }
-                    // A mode rings at its frequency; the force behind it is what is slower.
-                    let (behind, delay) = match ringing {
-                        None => (smoothed_flat(&seen, OBSERVED_OVER), 0.0),
-                        Some((hz, zeta)) => {
-                            let width = (0.4 / (hz * step_s)).clamp(OBSERVED_OVER, 12.0);
-                            (gaussian(&seen, width, 0), SecondOrder::delay_s(hz, zeta) / step_s)
-                        }
-                    };
-                    shifted(&behind, log.friction_late + late + delay)
+                    let behind = ringing.and_then(|mode| before_ringing(&seen, mode, step_s));
+                    let behind = behind.unwrap_or_else(|| smoothed_flat(&seen, OBSERVED_OVER));
+                    shifted(&behind, log.friction_late + late)
                 }
             };
             let force_n: Vec<f64> = seen.iter().map(|t| t / log.radius_m).collect();
@@ -305,11 +323,11 @@ impl<'a> Problem<'a> {
 
     fn scaled(&self, shown: &[f64]) -> Vec<f64> {
         let usable = self.logs.iter().flat_map(|log| log.usable.iter());
-        self.measured()
-            .zip(shown)
+        let left = self.noise.innovations(self.measured().zip(shown).map(|(y, x)| y - x).collect());
+        left.into_iter()
             .zip(&self.noise.deviation)
             .zip(usable)
-            .map(|(((y, x), s), used)| if *used { (y - x) / s } else { 0.0 })
+            .map(|((e, s), used)| if *used { e / s } else { 0.0 })
             .collect()
     }
 

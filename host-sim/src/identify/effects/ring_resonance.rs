@@ -2,6 +2,7 @@
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
+use crate::identify::spectrum::Spectrum;
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
@@ -10,6 +11,16 @@ pub(super) struct RingResonance;
 /// Frequency and damping ratio.
 fn mode(p: &[f64]) -> (f64, f64) {
     (p[0].exp().clamp(5.0, 249.0), p[1].exp().clamp(2e-3, 0.7))
+}
+
+/// Peaks of each log's spectrum.
+fn peaks_hz(view: &ContactView<'_>) -> impl Iterator<Item = f64> {
+    /// In each log: mains and their harmonics are among them.
+    const PEAKS: usize = 8;
+    view.logs.iter().flat_map(|log| {
+        let peaks = Spectrum::new(&log.friction_nm).map_or(Vec::new(), |spectrum| spectrum.peaks(PEAKS));
+        peaks.into_iter().map(|f| f / log.grid.step_s).filter(|hz| *hz > 5.0)
+    })
 }
 
 impl Effect for RingResonance {
@@ -21,11 +32,16 @@ impl Effect for RingResonance {
         }
     }
 
-    fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
+    fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
+        // Between samples that are further apart than the grid's points no mode is seen.
+        if !view.logs.iter().all(|log| log.grid.is_dense()) {
+            return Vec::new();
+        }
         let parameters = vec![Parameter::logarithm("mode_hz", 100.0, 0.6), Parameter::logarithm("damping_ratio", 0.05, 0.7)];
-        // Steps of 2 %: a mode with 1 % damping is as wide.
-        let hertz = (0..122).map(|i| 22.0 * 1.02f64.powi(i));
-        let starts = hertz.flat_map(|hz| [0.012, 0.06].map(|zeta: f64| vec![hz.ln(), zeta.ln()])).collect();
+        // A damped mode is as wide as a step of 6 %; one that rings is a peak of the channel's spectrum.
+        let damped = (0..42).map(|i| (22.0 * 1.06f64.powi(i), 0.06));
+        let rings = peaks_hz(view).flat_map(|hz| [0.004, 0.012].map(|zeta| (hz, zeta)));
+        let starts = damped.chain(rings).map(|(hz, zeta): (f64, f64)| vec![hz.ln(), zeta.ln()]).collect();
         vec![ContactTerm::any(self.id(), parameters, Starts::BestOf(starts, 3), |p, change| {
             change.mode = Some(mode(p));
         })
