@@ -81,6 +81,11 @@ impl Grid {
         Self { step_s, time_s: grid, covered, density, start_s, way: Way::Between(places) }
     }
 
+    /// Time between samples of the log, or the step where that is longer, s.
+    pub fn interval_s(&self) -> f64 {
+        self.step_s / self.density
+    }
+
     /// Points of the grid.
     pub fn len(&self) -> usize {
         self.time_s.len()

@@ -96,10 +96,14 @@ impl Ground {
         let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
         Self {
             rows: (0..deviation.len())
-                .filter(|i| deviation[*i] < limit && used[*i] != 0.0)
-                .filter(|i| !dense || problem.noise.named(*i) < limit)
+                .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && used[*i] != 0.0)
                 .collect(),
-            white: contact.logs.iter().flat_map(|log| vec![log.white_noise_nm(); log.len()]).collect(),
+            // Points between samples share the samples' noise.
+            white: contact
+                .logs
+                .iter()
+                .flat_map(|log| vec![log.friction_noise_nm / log.grid.density.sqrt(); log.len()])
+                .collect(),
             named: if dense {
                 (0..deviation.len()).map(|i| NAMED_WITHIN * problem.noise.named(i)).collect()
             } else {

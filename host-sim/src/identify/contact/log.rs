@@ -160,15 +160,6 @@ impl ContactLog {
         }
     }
 
-    /// White noise of the friction channel, N m: what is left of it in a block is known.
-    pub fn white_noise_nm(&self) -> f64 {
-        if self.grid.is_dense() {
-            noise::white_deviation(&self.friction_nm)
-        } else {
-            noise::difference_deviation(&self.friction_nm)
-        }
-    }
-
     /// Points of the grid.
     pub fn len(&self) -> usize {
         self.grid.len()

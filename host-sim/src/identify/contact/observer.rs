@@ -34,6 +34,8 @@ const LEAST_LOAD: f64 = 2e-3;
 pub struct Drive<'a> {
     /// Step, s.
     pub step_s: f64,
+    /// Time between samples of the log, s: what lies between them is not measured.
+    pub interval_s: f64,
     /// Way of the root, m.
     pub root_m: &'a [f64],
     /// Normal force, N.
@@ -180,7 +182,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let (coulomb, rest) = (contact.curve.at_speed(), contact.curve.at_rest());
     let least_load = LEAST_LOAD * drive.load_n.iter().copied().fold(0.0, f64::max);
     // The force's noise passes to the slip through the block: n/c, or n/(k h) where there is no damper.
-    let slip_noise = drive.noise.1 / c.max(k * dt);
+    let slip_noise = drive.noise.1 / c.max(k * drive.interval_s);
     let threshold = drive.slip_threshold_m_s.max(SLIP_NOISES * slip_noise);
     let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
@@ -259,4 +261,48 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::noise::White;
+
+    /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
+    #[test]
+    fn slip_is_seen_between_samples_that_are_far_apart() {
+        const STEP_S: f64 = 1e-3;
+        let contact = Contact {
+            curve: Curve::new(|_| 0.5),
+            stiffness_n_per_m: 2e4,
+            damping_n_s_per_m: 0.0,
+            bristles_n_per_m: f64::INFINITY,
+            branches: [(0.0, 1.0); 3],
+            viscous: (0.0, 0.0),
+            ageing: None,
+        };
+        let mut noise = White::new(1);
+        let samples: Vec<f64> = (0..102).map(|_| 5.0 + 0.15 * noise.next()).collect();
+        let force_n: Vec<f64> = (0..1000)
+            .map(|i| samples[i / 10] + (i % 10) as f64 / 10.0 * (samples[i / 10 + 1] - samples[i / 10]))
+            .collect();
+        let root_m: Vec<f64> = (0..1000).map(|i| 0.01 * STEP_S * i as f64).collect();
+        let sliding = |interval_s: f64| {
+            let drive = Drive {
+                step_s: STEP_S,
+                interval_s,
+                root_m: &root_m,
+                load_n: &[10.0; 1000],
+                force_n: &force_n,
+                log_factor: None,
+                slip_threshold_m_s: 1e-4,
+                noise: (1e-5, 0.15),
+            };
+            let seen = observe(&contact, &drive).sliding;
+            seen.iter().sum::<f64>() / seen.len() as f64
+        };
+        assert!(sliding(0.01) > 0.95, "{}", sliding(0.01));
+        // Were each point a sample of its own, its noise would hide the slip.
+        assert!(sliding(STEP_S) < 0.05, "{}", sliding(STEP_S));
+    }
 }

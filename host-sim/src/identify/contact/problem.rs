@@ -287,6 +287,7 @@ impl<'a> Problem<'a> {
             let usual = rms(&log.root_speed_m_s);
             let drive = Drive {
                 step_s,
+                interval_s: log.grid.interval_s(),
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
                 load_n: &log.load_n,
                 force_n: &force_n,

@@ -40,6 +40,8 @@ pub struct Scales {
     pub speed_m_s: f64,
     /// Usual friction torque, N m.
     pub torque_nm: f64,
+    /// Range of the disc's angle, rad.
+    pub turned_rad: f64,
 }
 
 /// First-order response that falls to 1/e in `time_s`, of an input held over each step.
@@ -74,6 +76,11 @@ impl Scales {
             load_n: usual(&|log| rms(&log.load_n)),
             speed_m_s: usual(&|log| rms(&log.root_speed_m_s)),
             torque_nm: usual(&|log| rms(&log.friction_nm)),
+            turned_rad: largest(&|log| {
+                let (least, most) = (f64::INFINITY, f64::NEG_INFINITY);
+                let ends = log.angle_rad.iter().fold((least, most), |(a, b), x| (a.min(*x), b.max(*x)));
+                ends.1 - ends.0
+            }),
         }
     }
 }

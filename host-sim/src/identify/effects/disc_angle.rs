@@ -32,6 +32,12 @@ impl Effect for DiscAngle {
             };
             view.logs.iter().enumerate().map(of).collect()
         };
+        // Over less than a period a wave is not to be told from a constant or a trend.
+        let first = (std::f64::consts::TAU / view.scales.turned_rad).ceil().max(1.0);
+        if first > ORDERS as f64 {
+            return Vec::new();
+        }
+        let first = first as usize;
         // An incremental encoder has its zero where it was switched on: the pattern may be turned from log to log.
         let forms = [("", vec![None]), ("own_origin", (0..view.train_count).map(Some).collect())];
         forms
@@ -40,19 +46,19 @@ impl Effect for DiscAngle {
                 let (mut columns, mut parameters) = (Vec::new(), Vec::new());
                 for only in logs {
                     let log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
-                    for order in 1..=ORDERS {
+                    for order in first..=ORDERS {
                         for (name, sine) in [("cos", false), ("sin", true)] {
                             columns.push(wave(order, sine, only));
                             parameters.push(Parameter::amplitude(format!("{name}{order}{log}"), 1.0 / order as f64));
                         }
                     }
                 }
-                let export = |p: &[f64]| -> Vec<(String, f64)> {
+                let export = move |p: &[f64]| -> Vec<(String, f64)> {
                     let mut out = vec![("origin_rad".to_string(), 0.0)];
-                    for order in 0..Law::<f64>::NAMES.len() / 2 {
+                    for order in 1..=Law::<f64>::NAMES.len() / 2 {
                         for (i, name) in ["cos", "sin"].into_iter().enumerate() {
-                            let value = if order < ORDERS { p[2 * order + i] } else { 0.0 };
-                            out.push((format!("{name}{}", order + 1), value.clamp(-1.0, 1.0)));
+                            let value = if (first..=ORDERS).contains(&order) { p[2 * (order - first) + i] } else { 0.0 };
+                            out.push((format!("{name}{order}"), value.clamp(-1.0, 1.0)));
                         }
                     }
                     out

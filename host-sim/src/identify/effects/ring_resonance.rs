@@ -33,15 +33,14 @@ impl Effect for RingResonance {
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
-        // Between samples that are further apart than the grid's points no mode is seen.
-        if !view.logs.iter().all(|log| log.grid.is_dense()) {
-            return Vec::new();
-        }
         let parameters = vec![Parameter::logarithm("mode_hz", 100.0, 0.6), Parameter::logarithm("damping_ratio", 0.05, 0.7)];
         // A damped mode is as wide as a step of 6 %; one that rings is a peak of the channel's spectrum.
         let damped = (0..42).map(|i| (22.0 * 1.06f64.powi(i), 0.06));
         let rings = peaks_hz(view).flat_map(|hz| [0.004, 0.012].map(|zeta| (hz, zeta)));
-        let starts = damped.chain(rings).map(|(hz, zeta): (f64, f64)| vec![hz.ln(), zeta.ln()]).collect();
+        // Faster than half of the sampling rate no mode is seen.
+        let fastest_hz = view.logs.iter().map(|log| 0.5 / log.grid.interval_s()).fold(f64::INFINITY, f64::min);
+        let seen = damped.chain(rings).filter(|(hz, _)| *hz < fastest_hz);
+        let starts = seen.map(|(hz, zeta): (f64, f64)| vec![hz.ln(), zeta.ln()]).collect();
         vec![ContactTerm::any(self.id(), parameters, Starts::BestOf(starts, 3), |p, change| {
             change.mode = Some(mode(p));
         })
