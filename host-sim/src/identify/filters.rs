@@ -15,6 +15,21 @@ pub fn gaussian(values: &[f64], width: f64, order: usize) -> Vec<f64> {
     convolved(values, &kernel(width, order, order >= 2))
 }
 
+/// As [`gaussian`] of a channel with white noise of this deviation, and 0 where there is nothing but that noise: as a column of a
+/// balance, noise would be weighed as if it were motion, and where a record mostly rests, rest would outweigh motion.
+pub fn derivative_of_motion(values: &[f64], width: f64, order: usize, noise: f64) -> Vec<f64> {
+    /// Energy over this many times the noise's is motion: over [`WIDTHS`] it is known to some half of itself.
+    const OVER_NOISE: f64 = 3.0;
+    /// Energy is taken over so many widths.
+    const WIDTHS: f64 = 2.0;
+    let of_noise = noise * noise * kernel(width, order, order >= 2).iter().map(|k| k * k).sum::<f64>();
+    let derivative = gaussian(values, width, order);
+    let square: Vec<f64> = derivative.iter().map(|d| d * d).collect();
+    let energy = gaussian(&square, WIDTHS * width, 0);
+    let share = |energy: f64| (1.0 - OVER_NOISE * of_noise / energy.max(f64::MIN_POSITIVE)).max(0.0);
+    derivative.iter().zip(energy).map(|(d, energy)| d * share(energy)).collect()
+}
+
 /// Values smoothed with (3 − x²/w²)/2 times a Gaussian of width w (samples), so that polynomials up to the third degree pass
 /// as they are: at ωw = 0.75 it loses 4 % of an amplitude where the Gaussian loses 25 %, for a third more of the noise. For
 /// signals that a transient is judged by.
@@ -209,6 +224,21 @@ mod tests {
         let kept = |smooth: Vec<f64>| rms(&smooth[50..150]) / rms(&mode[50..150]);
         assert!((0.95..0.99).contains(&kept(smoothed_flat(&mode, 1.0))));
         assert!(kept(gaussian(&mode, 1.0, 0)) < 0.78);
+    }
+
+    #[test]
+    fn a_derivative_is_there_where_something_moves_and_not_where_noise_is_alone() {
+        let noise = crate::identify::noise::tests::white(4000, 7);
+        let step = |i: usize| if i < 2000 { 0.0 } else { 1.0 };
+        let shown: Vec<f64> = noise.iter().enumerate().map(|(i, e)| step(i) + 0.01 * e).collect();
+        let clean: Vec<f64> = (0..4000).map(step).collect();
+        for order in 1..=2 {
+            let found = derivative_of_motion(&shown, 4.0, order, 0.01);
+            let (all, true_one) = (gaussian(&shown, 4.0, order), gaussian(&clean, 4.0, order));
+            assert!(rms(&found[..1900]) < 0.15 * rms(&all[..1900]), "{order}");
+            let error: Vec<f64> = (1980..2020).map(|i| found[i] - true_one[i]).collect();
+            assert!(rms(&error) < 0.12 * rms(&true_one[1980..2020]), "{order}: {}", rms(&error));
+        }
     }
 
     #[test]

@@ -377,15 +377,22 @@ pub fn judge(
         }
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
-        let (noise, ranked, sizes, ends) = {
+        let (noise, ranked, sizes, best) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, progress);
             let sizes = found.ranked.iter().map(|r| search::sizes(&problem, &r.fit)).collect();
             let best = &found.ranked[0].fit;
-            let ends = problem.change(&best.terms, &best.p).ends_nm;
-            (problem.noise.clone(), found.ranked, sizes, ends)
+            let best = problem.change(&best.terms, &best.p);
+            (problem.noise.clone(), found.ranked, sizes, best)
         };
-        if let (Some(ends), true) = (ends, drive.is_some()) {
+        if let (Some(end_n), true) = (best.normal_end_n, normal_load.is_some()) {
+            // Where the normal channel shows its end, the actuator's balance has no normal force.
+            let mut seen = logs.clone();
+            seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n));
+            let seen: Option<Vec<NormalLoadLog>> = seen.iter().map(NormalLoadLog::new).collect();
+            normal_load = seen.map(|logs| search_normal_load(&logs, rig));
+        }
+        if let (Some(ends), true) = (best.ends_nm, drive.is_some()) {
             // Where the friction channel shows its end, the drive's balance has no friction torque.
             let mut seen = logs.clone();
             seen.iter_mut().for_each(|log| log.leave_out_ends(ends));

@@ -7,7 +7,7 @@
 
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
-use super::filters::{gaussian, largest_change, local_maximum, rms, white_share};
+use super::filters::{derivative_of_motion, gaussian, largest_change, local_maximum, rms, white_share};
 use super::noise;
 use super::term::Parameter;
 use crate::files::rig_file::RigFile;
@@ -42,14 +42,21 @@ pub struct NormalLoadLog {
     pub time_s: Vec<f64>,
     /// Points that take part.
     pub usable: Vec<bool>,
+    /// Noise of the torque, N m.
+    pub torque_noise_nm: f64,
+    /// Noise of the normal force, N.
+    pub normal_noise_n: f64,
 }
 
 impl NormalLoadLog {
     /// The normal-load actuator of a contact log; `None` where M1's torque is not logged.
     pub fn new(log: &ContactLog) -> Option<Self> {
+        let torque_nm = log.m1_torque_nm.clone()?;
         Some(Self {
             step_s: log.grid.step_s,
-            torque_nm: log.m1_torque_nm.clone()?,
+            torque_noise_nm: noise::standard_deviation(&torque_nm),
+            normal_noise_n: noise::standard_deviation(&log.normal_n),
+            torque_nm,
             angle_rad: log.m1_angle_rad.clone(),
             filtered_n: gaussian(&log.normal_n, WIDTH, 0),
             normal_n: log.normal_n.clone(),
@@ -103,7 +110,10 @@ pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales)
     let concat = |of: &dyn Fn(&NormalLoadLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
     let derivative = |log: &NormalLoadLog, order: usize| -> Vec<f64> {
         let per = log.step_s.powi(order as i32);
-        gaussian(&log.normal_n, WIDTH, order).iter().map(|d| d / per).collect()
+        derivative_of_motion(&log.normal_n, WIDTH, order, log.normal_noise_n)
+            .iter()
+            .map(|d| d / per)
+            .collect()
     };
     let gain = rig.lever_gain_n_per_nm;
     let omega = std::f64::consts::TAU * rig.pressure.mode_hz;
@@ -132,7 +142,10 @@ pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales)
         ),
         (
             known("torque_late_s", 0.0, 1e-3),
-            concat(&|log| gaussian(&log.torque_nm, WIDTH, 1).iter().map(|d| -d / log.step_s).collect()),
+            concat(&|log| {
+                let slope = derivative_of_motion(&log.torque_nm, WIDTH, 1, log.torque_noise_nm);
+                slope.iter().map(|d| -d / log.step_s).collect()
+            }),
         ),
     ];
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, gain, scales)).collect();
@@ -144,8 +157,7 @@ fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> Log
     let change = largest_change(&log.torque_nm, WIDTH);
     let bend =
         local_maximum(&gaussian(&log.normal_n, WIDTH, 2).iter().map(|d| d.abs()).collect::<Vec<_>>(), 4);
-    let white = white_share(WIDTH)
-        * noise::standard_deviation(&log.torque_nm).hypot(noise::standard_deviation(&log.normal_n) / gain);
+    let white = white_share(WIDTH) * log.torque_noise_nm.hypot(log.normal_noise_n / gain);
     let noise = move |i: usize| {
         vec![white, LEAST_NOISE * log.torque_nm[i], BETWEEN_SAMPLES * change[i], BEND * bend[i] / gain]
     };

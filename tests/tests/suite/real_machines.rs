@@ -224,7 +224,7 @@ fn the_band_brake_holds_by_direction_and_by_load() {
 }
 
 #[test]
-#[ignore = "three minutes: ten strokes at three loads"]
+#[ignore = "two minutes: ten strokes at three loads"]
 fn the_o_ring_drags_in_an_affine_law_of_its_load() {
     let mut bench = Bench::new();
     for name in ["oring_1bar.csv", "oring_3bar.csv", "oring_7bar.csv"] {

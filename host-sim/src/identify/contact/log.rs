@@ -71,6 +71,9 @@ pub struct ContactLog {
     pub ringing: Option<Ringing>,
 }
 
+/// A channel is at its end within so many deviations of its noise.
+pub const END_NOISES: f64 = 4.0;
+
 impl ContactLog {
     /// Prepares a log.
     ///
@@ -148,15 +151,24 @@ impl ContactLog {
 
     /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.
     pub fn leave_out_ends(&mut self, (low, high): (f64, f64)) {
-        const NOISES: f64 = 4.0;
+        let near = END_NOISES * self.friction_noise_nm;
+        let ends = self.friction_nm.iter().map(|x| *x > high - near || *x < low + near).collect();
+        self.leave_out(ends);
+    }
+
+    /// Takes out the points at which the normal channel shows its upper end.
+    pub fn leave_out_normal_end(&mut self, end_n: f64) {
+        let near = END_NOISES * self.normal_noise_n;
+        let ends = self.normal_n.iter().map(|x| *x > end_n - near).collect();
+        self.leave_out(ends);
+    }
+
+    fn leave_out(&mut self, ends: Vec<bool>) {
         const BEFORE: usize = 12;
         const AFTER: usize = 25;
-        let near = NOISES * self.friction_noise_nm;
         let last = self.len().saturating_sub(1);
-        for i in 0..self.len() {
-            if self.friction_nm[i] > high - near || self.friction_nm[i] < low + near {
-                self.usable[i.saturating_sub(BEFORE)..=(i + AFTER).min(last)].fill(false);
-            }
+        for i in (0..self.len()).filter(|i| ends[*i]) {
+            self.usable[i.saturating_sub(BEFORE)..=(i + AFTER).min(last)].fill(false);
         }
     }
 

@@ -2,6 +2,9 @@
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::log::END_NOISES;
+use crate::identify::filters::gaussian;
+use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
@@ -13,6 +16,12 @@ const SPIKES: f64 = 1e-3;
 const LEAST_SHARE: f64 = 0.004;
 /// … within so many deviations of the noise on either side of it.
 const EDGE_NOISES: f64 = 2.5;
+/// M1's torque is smoothed over so many samples: the mechanism follows no faster.
+const TORQUE_WIDTH: f64 = 2.0;
+/// The elements touch above this share of the usual load.
+const TOUCHING: f64 = 0.1;
+/// Load over M1's torque is a line within this share: the mechanism's friction and springs.
+const LINE_WITHIN: f64 = 0.03;
 
 /// The end at which samples pile up: more of them in the last band of values than in the next one below, thrice over.
 fn end(values: &mut [f64], noise: f64) -> Option<f64> {
@@ -36,6 +45,13 @@ impl Effect for AdcSaturation {
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
+        self.friction(view).into_iter().chain(self.normal(view)).collect()
+    }
+}
+
+impl AdcSaturation {
+    /// The friction channel shows nothing beyond its ends.
+    fn friction(&self, view: &ContactView<'_>) -> Option<ContactTerm> {
         let all = |sign: f64| -> Vec<f64> { view.logs.iter().flat_map(|log| log.friction_nm.iter().map(move |x| sign * x)).collect() };
         let noise = view.logs.iter().map(|log| log.friction_noise_nm).fold(1e-9, f64::max);
         let scale = view.scales.torque_nm;
@@ -45,20 +61,61 @@ impl Effect for AdcSaturation {
             (Some(scale), Some(scale))
         };
         if high.is_none() && low.is_none() {
-            return Vec::new();
+            return None;
         }
         const FAR: f64 = 1e3;
-        let parameter = |name: &str, at: f64| Parameter { mean: at / scale, ..Parameter::amplitude(name, 0.05) };
-        let parameters: Vec<Parameter> = [("high", high), ("low", low)]
-            .into_iter()
-            .map(|(name, end)| Parameter { amplitude: false, sd: 0.02, step: 2e-3, reach: 0.05, ..parameter(name, end.map_or(FAR * scale, |e| e)) })
-            .collect();
+        let at = |name: &str, end: Option<f64>| Parameter { reach: 0.05, ..known(name, end.map_or(FAR, |e| e / scale), 0.02) };
+        let parameters = vec![at("high", high), at("low", low)];
         let start = parameters.iter().map(|p| p.mean).collect();
-        vec![ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
+        let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
             change.ends_nm = Some((-p[1] * scale, p[0] * scale));
-        })
-        .exported(move |p, _| {
+        });
+        Some(term.exported(move |p, _| {
             vec![("friction_low_nm".into(), -p[1] * scale), ("friction_high_nm".into(), p[0] * scale)]
-        })]
+        }))
     }
+
+    /// Where the normal channel is at its upper end, the load is what M1's torque makes it elsewhere.
+    fn normal(&self, view: &ContactView<'_>) -> Option<ContactTerm> {
+        let torque: Vec<Vec<f64>> =
+            view.logs.iter().map(|log| log.m1_torque_nm.as_ref().map(|t| gaussian(t, TORQUE_WIDTH, 0))).collect::<Option<_>>()?;
+        let scale = view.scales.load_n;
+        let noise = view.logs.iter().map(|log| log.normal_noise_n).fold(1e-9, f64::max);
+        let (high, [gain, offset]) = if view.training {
+            let high = end(&mut view.logs.iter().flat_map(|log| log.normal_n.clone()).collect::<Vec<_>>(), noise)?;
+            let below = |n: f64| n > TOUCHING * scale && n < high - END_NOISES * noise;
+            let points = view.logs.iter().zip(&torque).flat_map(|(log, t)| log.load_n.iter().zip(t).filter(|(n, _)| below(**n)));
+            let (n, t): (Vec<f64>, Vec<f64>) = points.map(|(n, t)| (n / scale, *t)).unzip();
+            let (h, g) = normal_equations(&[t, vec![1.0; n.len()]], &vec![1.0; n.len()], &n);
+            let line = linear::factor(&h).solve(&g);
+            (high, [line[0], line[1]])
+        } else {
+            (scale, [1.0, 0.0])
+        };
+        let parameters = vec![
+            known("normal_high", high / scale, 0.5 * noise / scale),
+            known("load_per_torque", gain, LINE_WITHIN * gain.abs()),
+            known("load_without_torque", offset, LINE_WITHIN),
+        ];
+        let start = parameters.iter().map(|p| p.mean).collect();
+        let load: Vec<Vec<f64>> = view.logs.iter().map(|log| log.load_n.clone()).collect();
+        let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
+            let near = p[0] * scale - END_NOISES * noise;
+            let of = |(load, torque): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+                let factor = |(n, t): (&f64, &f64)| {
+                    let at_end = 1.0 / (1.0 + (-(n - near) / noise).clamp(-30.0, 30.0).exp());
+                    at_end * ((p[1] * t + p[2]) * scale / n.max(1e-9)).max(1.0).ln()
+                };
+                load.iter().zip(torque).map(factor).collect()
+            };
+            change.add_log_factor(&[load.iter().zip(&torque).map(of).collect()], &[1.0]);
+            change.normal_end_n = Some(p[0] * scale);
+        });
+        Some(ContactTerm { form: "normal", ..term })
+    }
+}
+
+/// A parameter that is known about a value.
+fn known(name: &str, mean: f64, sd: f64) -> Parameter {
+    Parameter { amplitude: false, mean, step: 0.1 * sd, ..Parameter::amplitude(name, sd) }
 }
