@@ -102,8 +102,9 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
                 })
                 .collect(),
         };
-        if CoreExtension::with_id(term.effect).is_some() && term.export.is_some() {
-            let core = CoreExtension::with_id(term.effect).map(CoreExtension::names).unwrap_or_default();
+        let core = CoreExtension::with_id(term.effect).map(CoreExtension::names).unwrap_or_default();
+        // A form of which the core has nothing is told, and not predicted.
+        if term.export.is_some() && core.iter().any(|name| exported.contains_key(*name)) {
             let parameters = core
                 .iter()
                 .map(|name| ((*name).to_string(), exported.get(*name).map_or(0.0, |v| v.value)))

@@ -388,7 +388,9 @@ pub fn judge(
         if let (Some(end_n), true) = (best.normal_end_n, normal_load.is_some()) {
             // Where the normal channel shows its end, the actuator's balance has no normal force.
             let mut seen = logs.clone();
-            seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n));
+            // A log that is at the end most of the time has less noise than its channel.
+            let noise_n = logs.iter().map(|log| log.normal_noise_n).fold(0.0, f64::max);
+            seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n, noise_n));
             let seen: Option<Vec<NormalLoadLog>> = seen.iter().map(NormalLoadLog::new).collect();
             normal_load = seen.map(|logs| search_normal_load(&logs, rig));
         }

@@ -91,6 +91,27 @@ mod long {
 
     #[test]
     #[ignore = "long: cargo verify runs it"]
+    fn a_normal_channel_that_clips_is_named_with_its_end() {
+        let effects = [Effect::AdcSaturation];
+        let clips_normal = |seed: &u64| {
+            let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&effects, *seed) }).unwrap();
+            serde_json::to_value(&case.truth.laws).unwrap()["adc_saturation"]["channel"] == "normal"
+        };
+        let seed = (101..).find(clips_normal).unwrap();
+        let written = named(&effects, seed, Base::Series);
+        let case = generate(&Scenario { base: Base::Series, ..Scenario::new(&effects, seed) }).unwrap();
+        let log = Log::parse_csv("train", case.train[0].as_bytes()).unwrap();
+        let mut shown = log.contact().unwrap().normal_force_n.to_vec();
+        shown.sort_by(f64::total_cmp);
+        // Most of a clipped tenth lies at the end.
+        let top = shown[shown.len() * 95 / 100];
+        let found = written.diagnosis.causes[0].parameters["normal_high_n"].value;
+        assert!((found / top - 1.0).abs() < 0.02, "{found} for {top}");
+        assert!(!written.model.contains("friction_high_nm"), "{}", written.model);
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
     fn springs_that_harden_are_named() {
         named(&[Effect::FoilHardening], 101, Base::Lugre);
     }

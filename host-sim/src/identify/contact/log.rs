@@ -156,9 +156,9 @@ impl ContactLog {
         self.leave_out(ends);
     }
 
-    /// Takes out the points at which the normal channel shows its upper end.
-    pub fn leave_out_normal_end(&mut self, end_n: f64) {
-        let near = END_NOISES * self.normal_noise_n;
+    /// Takes out the points at which the normal channel, with this noise, shows its upper end.
+    pub fn leave_out_normal_end(&mut self, end_n: f64, noise_n: f64) {
+        let near = END_NOISES * noise_n;
         let ends = self.normal_n.iter().map(|x| *x > end_n - near).collect();
         self.leave_out(ends);
     }

@@ -111,7 +111,11 @@ impl AdcSaturation {
             change.add_log_factor(&[load.iter().zip(&torque).map(of).collect()], &[1.0]);
             change.normal_end_n = Some(p[0] * scale);
         });
-        Some(ContactTerm { form: "normal", ..term })
+        let export = move |p: &[f64]| {
+            let names = ["normal_high_n", "load_n_per_m1_torque_nm", "load_without_m1_torque_n"].map(String::from);
+            names.into_iter().zip(p.iter().map(|x| x * scale)).collect()
+        };
+        Some(ContactTerm { form: "normal", ..term }.exported(move |p, _| export(p)))
     }
 }
 
