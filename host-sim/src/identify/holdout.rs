@@ -109,9 +109,22 @@ pub fn errors(
     if let Some(contact) = &found.contact {
         let place = found.place(Part::Friction).unwrap_or(0);
         let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
-        out.push((Part::Friction, contact_errors(contact, place, &prepared, training)));
         let drives: Option<Vec<DriveLog>> =
             prepared.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
+        let following = match (&contact.disc_cause, &found.drive, &drives) {
+            (Some(cause), Some(drive), Some(drives)) if found.best().effects.contains(&cause.effect) => {
+                if training {
+                    Some(contact.logs.clone())
+                } else {
+                    let (_, fixed) = drive_alternatives(found, drive, drives, Some(rig));
+                    judge::following(&prepared, fixed.iter(), judge::torque_error(drive))
+                        .map(|(logs, _)| logs)
+                }
+            }
+            _ => None,
+        };
+        let following = following.as_ref().unwrap_or(&prepared);
+        out.push((Part::Friction, contact_errors(contact, place, &prepared, following, training)));
         if let (Some(drive), Some(drives)) = (&found.drive, drives) {
             out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), training)));
         }
@@ -132,7 +145,14 @@ pub fn errors(
     Ok(out)
 }
 
-fn contact_errors(contact: &ContactPart, place: usize, logs: &[ContactLog], training: bool) -> Errors {
+/// The baseline with the motion as logged, the extended model with the disc's own where a cause parts the two.
+fn contact_errors(
+    contact: &ContactPart,
+    place: usize,
+    as_logged: &[ContactLog],
+    logs: &[ContactLog],
+    training: bool,
+) -> Errors {
     let terms = judge::contact_terms(logs, &contact.scales, training, contact.logs.len(), contact.block);
     // The forms stand in the same order, but that a held-out log may offer some that the training logs did not.
     let find = |term: usize| {
@@ -146,11 +166,12 @@ fn contact_errors(contact: &ContactPart, place: usize, logs: &[ContactLog], trai
     let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map_or(fit, |r| &r.fit);
     let mut problem = Problem::new(logs, &contact.baseline, &terms);
     problem.noise = problem.noise_at(&own_terms, &fit.p);
-    let left = |terms: &[usize], p: &[f64]| {
+    let left = |problem: &Problem<'_>, terms: &[usize], p: &[f64]| {
         let shown = problem.predict(terms, p).shown_nm;
         problem.noise.innovations(problem.measured().zip(shown).map(|(y, x)| y - x).collect())
     };
-    let (base, extended) = (left(&none.terms, &none.p), left(&own_terms, &fit.p));
+    let logged = Problem::with_noise(as_logged, &contact.baseline, &terms, problem.noise.clone());
+    let (base, extended) = (left(&logged, &none.terms, &none.p), left(&problem, &own_terms, &fit.p));
     let mut errors = Errors::default();
     let mut at = 0;
     // Bristles at rest and the instants at which they break away show no law.
@@ -262,11 +283,23 @@ fn drive_errors(
             part.balance.row_step_s,
         );
     }
+    let (balance, fixed) = drive_alternatives(found, part, logs, rig);
+    let (base, extended) = extended_residual(part, place, &balance, &fixed);
+    linear_errors(&names, &balance, &base, &extended, balance.row_step_s)
+}
+
+/// The balance of held-out logs, and the forms of the drive's causes there with the training logs' shapes.
+fn drive_alternatives(
+    found: &Judgement,
+    part: &Linear,
+    logs: &[DriveLog],
+    rig: Option<&RigFile>,
+) -> (Balance, Vec<Alternative>) {
     let nothing = drive::DrivePrior { inertia: None, coulomb: None, viscous: None };
     let prior = rig.map_or(nothing, judge::drive_prior);
     let scales = DriveScales::new(logs);
     let balance = drive::balance(logs, &prior, &scales);
-    let solved = &part.solved[place];
+    let solved = &part.solved[found.place(Part::Drive).unwrap_or(0)];
     let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(solved);
     let residual: Vec<f64> = {
         let mut r = balance.response.clone();
@@ -289,8 +322,7 @@ fn drive_errors(
         };
         fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.drive(&view)));
     }
-    let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(&names, &balance, &base, &extended, balance.row_step_s)
+    (balance, fixed)
 }
 
 fn normal_load_errors(

@@ -358,7 +358,11 @@ pub fn judge(
         let baseline = contact_baseline::baseline(model, contact_baseline::KNOWN_WITHIN);
         // The motion with which the baseline leaves less is the better known one.
         let mut disc_cause = None;
-        if let Some((following, effect)) = drive.as_ref().and_then(|found| following_disc(&logs, found)) {
+        let parted = drive.as_ref().and_then(|drive| {
+            let best = drive.solved.first()?;
+            following(&logs, best.set.iter().map(|a| &drive.alternatives[*a]), torque_error(drive))
+        });
+        if let Some((following, effect)) = parted {
             let (residual_nm, as_logged) = left_by_baseline(&logs, &baseline);
             if left_by_baseline(&following, &baseline).1 < as_logged {
                 disc_cause = Some(DiscCause { effect, residual_nm });
@@ -439,17 +443,23 @@ pub fn judge(
     Ok(judgement)
 }
 
-/// The logs with the disc's own motion, where the drive's best set parts it from the motor's encoder; the cause's id.
-fn following_disc(logs: &[ContactLog], drive: &Linear) -> Option<(Vec<ContactLog>, &'static str)> {
-    let best = drive.solved.first()?;
-    let torque_error = drive.rest(0).size * drive.balance.scale;
-    let cause = best.set.iter().map(|a| &drive.alternatives[*a]).find(|a| a.disc.is_some())?;
-    let disc = cause.disc.as_ref()?;
+/// What the drive's best set leaves, as an error of the torque that moves the disc, N m.
+pub fn torque_error(drive: &Linear) -> f64 {
+    drive.rest(0).size * drive.balance.scale
+}
+
+/// The logs with the disc's own motion, where one of these forms parts it from the motor's encoder; the cause's id.
+pub fn following<'f>(
+    logs: &[ContactLog],
+    mut forms: impl Iterator<Item = &'f Alternative>,
+    torque_error_nm: f64,
+) -> Option<(Vec<ContactLog>, &'static str)> {
+    let (effect, disc) = forms.find_map(|form| Some((form.effect, form.disc.as_ref()?)))?;
     let mut logs = logs.to_vec();
     for (log, angle_rad) in logs.iter_mut().zip(&disc.angle_rad) {
-        log.follow(angle_rad, disc.speed_per_torque * torque_error);
+        log.follow(angle_rad, disc.speed_per_torque * torque_error_nm);
     }
-    Some((logs, cause.effect))
+    Some((logs, effect))
 }
 
 /// What the baseline leaves of these logs with a noise model of its own, N m, and its mean square, (N m)².

@@ -29,6 +29,7 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             stiffness_n_per_m: get("c_n_per_m"),
             damping_n_s_per_m: 0.0,
             bristles_n_per_m: f64::INFINITY,
+            bristles_alone: false,
             late_ms: 0.0,
         }
     } else {
@@ -41,6 +42,7 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             stiffness_n_per_m: if block { get("k_u_n_per_m") } else { get("sigma0_n_per_m") },
             damping_n_s_per_m: if block { get("c_u_n_s_per_m") } else { get("sigma1_n_s_per_m") },
             bristles_n_per_m: if block { get("sigma0_n_per_m") } else { f64::INFINITY },
+            bristles_alone: !block,
             late_ms: 0.0,
         }
     };

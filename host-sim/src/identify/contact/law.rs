@@ -52,11 +52,6 @@ impl Curve {
         (1.0 / step(), SLOWEST_M_S.ln())
     }
 
-    /// Breakaway coefficient g(0).
-    pub fn at_rest(&self) -> f64 {
-        self.values[0]
-    }
-
     /// Coefficient of the fastest slip.
     pub fn at_speed(&self) -> f64 {
         self.values[ENTRIES - 1]
@@ -83,6 +78,23 @@ pub struct Ageing {
     pub first_age_s: f64,
 }
 
+impl Ageing {
+    /// Friction over that of a fresh contact.
+    pub fn factor(&self, age_s: f64) -> f64 {
+        1.0 + self.growth * (age_s / self.onset_s).ln_1p()
+    }
+
+    /// Age after a step of slip at this speed.
+    pub fn renewed(&self, age_s: f64, slip_m_s: f64, step_s: f64) -> f64 {
+        let share = slip_m_s * step_s / self.renewal_m;
+        if share > 1e-6 {
+            age_s * (-share).exp() - step_s * (-share).exp_m1() / share
+        } else {
+            age_s + step_s
+        }
+    }
+}
+
 /// The contact of a log for one set of numbers.
 #[derive(Debug, Clone)]
 pub struct Contact {
@@ -94,6 +106,8 @@ pub struct Contact {
     pub damping_n_s_per_m: f64,
     /// Stiffness of bristles in series with it, N/m; infinite where they are the stiffness itself.
     pub bristles_n_per_m: f64,
+    /// Whether the stiffness is that of bristles which follow the root (LuGre), and not of a block that slips as a whole.
+    pub bristles_alone: bool,
     /// Maxwell branches beside it: stiffness, N/m, and relaxation time, s.
     pub branches: [(f64, f64); 3],
     /// Friction per slip speed: per load, s/m, and whatever the load, N s/m.

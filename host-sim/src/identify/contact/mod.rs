@@ -1,6 +1,7 @@
 //! The contact: friction torque from motion and load, with the slip observed from the measured force.
 
 pub mod baseline;
+mod bristles;
 pub mod change;
 pub mod law;
 pub mod log;

@@ -9,7 +9,7 @@
 //! | load between samples | a quarter of the load's change a sample |
 //! | form of the model | 0.4 % of the force |
 //! | noise of the slip speed | through g′, where the tip slips |
-//! | noise of the root's motion | through the stiffness, where it sticks |
+//! | noise of the root's motion | through the stiffness, where it sticks: for [`Noise::named`] alone, since the likelihood has it in the residual's own scale ([`super::observer::Observed::certainty`]) |
 //! | transitions | 3 % of the load near a change between slip and stick |
 //!
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
@@ -34,6 +34,8 @@ const TRANSITION: f64 = 0.03;
 const SOURCES: usize = 8;
 /// Place of the form of the model among them.
 const MODEL_FORM_SOURCE: usize = 4;
+/// Place of the root's motion through the stiffness.
+const ROOT_MOTION_SOURCE: usize = 6;
 /// Frequency below which effects live, Hz; above it residuals only tell how white they are.
 const SLOW_HZ: f64 = 30.0;
 
@@ -110,6 +112,8 @@ impl Noise {
         factors[MODEL_FORM_SOURCE] = 0.0;
         noise.weigh(logs, &factors);
         noise.named = std::mem::take(&mut noise.deviation);
+        // The root's motion is in the residuals' scale already, with the stiffness of each point.
+        noise.sources.iter_mut().for_each(|n| n[ROOT_MOTION_SOURCE] = 0.0);
         noise.weigh(logs, &[1.0; SOURCES]);
         noise
     }

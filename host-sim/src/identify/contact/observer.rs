@@ -8,7 +8,7 @@
 //! the observed slip, F = sgn(w) (F_N g(|w|) e^m + F_N a2 |w| + film); where it sticks F = k u + c V + branches, u integrated from
 //! the motion with a weak pull to the measurement, held below breakaway. The two are blended smoothly, since a switch
 //! makes the likelihood rough: s is a product of sigmoids in the slip speed, in its ratio to the root's speed and in the
-//! force's size and sign.
+//! force's size and sign. Bristles without a block need none of this (`bristles.rs`).
 //!
 //! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
 //! Left out: what the force did between samples; slip that begins and ends within one.
@@ -59,6 +59,27 @@ pub struct Observed {
     pub slip_m_s: Vec<f64>,
     /// Share of slip in the blend, 0 to 1.
     pub sliding: Vec<f64>,
+    /// Deviation of the channel's noise over that of what the prediction leaves, 0 to 1: where the tip sticks, the noise of
+    /// the root's way comes through the stiffness. A stiffness of which that leaves nothing to see has no weight there.
+    pub certainty: Vec<f64>,
+}
+
+impl Observed {
+    /// Nothing yet, for so many samples.
+    pub fn new(samples: usize) -> Self {
+        let zeros = vec![0.0; samples];
+        Self {
+            force_n: zeros.clone(),
+            slip_m_s: zeros.clone(),
+            sliding: zeros,
+            certainty: vec![1.0; samples],
+        }
+    }
+}
+
+/// Below this load a contact carries nothing, N.
+pub(super) fn least_load_n(drive: &Drive<'_>) -> f64 {
+    LEAST_LOAD * drive.load_n.iter().copied().fold(0.0, f64::max)
 }
 
 #[inline]
@@ -152,9 +173,12 @@ fn stick_gain(motion: f64, force: f64) -> f64 {
 pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let n = drive.root_m.len();
     let dt = drive.step_s;
-    let mut out = Observed { force_n: vec![0.0; n], slip_m_s: vec![0.0; n], sliding: vec![0.0; n] };
+    let mut out = Observed::new(n);
     if n < 3 {
         return out;
+    }
+    if contact.bristles_alone {
+        return super::bristles::follow(contact, drive);
     }
     let block = Block::new(contact, dt);
     let (k, c) = (contact.stiffness_n_per_m, contact.damping_n_s_per_m);
@@ -179,12 +203,16 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     }
 
     let (per_log, log_slowest) = Curve::scale_of_table();
-    let (coulomb, rest) = (contact.curve.at_speed(), contact.curve.at_rest());
-    let least_load = LEAST_LOAD * drive.load_n.iter().copied().fold(0.0, f64::max);
+    let coulomb = contact.curve.at_speed();
+    let least_load = least_load_n(drive);
     // The force's noise passes to the slip through the block: n/c, or n/(k h) where there is no damper.
     let slip_noise = drive.noise.1 / c.max(k * drive.interval_s);
     let threshold = drive.slip_threshold_m_s.max(SLIP_NOISES * slip_noise);
+    let creep_noise = drive.noise.0.hypot(slip_noise);
     let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
+    // Variance of the held force over the channel's; a limit that noise smears is a logistic of the same deviation.
+    let held_variance = (gain / (1.0 - gain).max(1e-12)).min(1e12);
+    let smear = 3f64.sqrt() / std::f64::consts::PI * held_variance.sqrt() * drive.noise.1;
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
     let mut observed = start;
     let mut held = start;
@@ -206,7 +234,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         }
         let mut loaded = drive.log_factor.map_or(load, |m| load * m[i].exp());
         if let Some(ageing) = contact.ageing {
-            loaded *= 1.0 + ageing.growth * (age / ageing.onset_s).ln_1p();
+            loaded *= ageing.factor(age);
         }
         let sign = if w > 0.0 { 1.0 } else { -1.0 };
         let resisting = sign * force[i] / (load * coulomb);
@@ -227,15 +255,18 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
                 sticking += contact.branches[b].0 * (held[1 + b] + moved) * branch[b];
             }
             // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
-            let limit = loaded * rest;
+            // Slower than what counts as slip it is friction at the slip's speed, its noise taken off.
+            let creep = (speed * speed - creep_noise * creep_noise).max(0.0).sqrt();
+            let limit = loaded * contact.curve.at(creep, per_log, log_slowest);
             let towards = sigmoid((sticking.signum() * v / (0.1 * threshold) - 1.0) / WIDTH);
-            let over = (sticking.abs() - limit) / (LIMIT_WIDTH * limit);
+            let width = smear.hypot(LIMIT_WIDTH * limit);
+            let over = (sticking.abs() - limit) / width;
             let beyond = if over > 30.0 {
                 sticking.abs() - limit
             } else if over < -30.0 {
                 0.0
             } else {
-                LIMIT_WIDTH * limit * over.exp().ln_1p()
+                width * over.exp().ln_1p()
             };
             let breaks = sigmoid(over) * towards;
             sticking -= sticking.signum() * beyond * towards;
@@ -246,17 +277,14 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
                 held[1 + b] = follows * observed[1 + b] + (1.0 - follows) * (held[1 + b] + moved) * branch[b];
             }
             out.force_n[i] = slips * sliding + (1.0 - slips) * sticking;
+            let held_share = 1.0 - follows;
+            out.certainty[i] = 1.0 / (1.0 + held_share * held_share * held_variance).sqrt();
         } else {
             held = observed;
             out.force_n[i] = sliding;
         }
         if let Some(ageing) = contact.ageing {
-            let renewed = speed * dt / ageing.renewal_m;
-            let aged = if renewed > 1e-6 {
-                age * (-renewed).exp() - dt * (-renewed).exp_m1() / renewed
-            } else {
-                age + dt
-            };
+            let aged = ageing.renewed(age, speed, dt);
             age = slips * aged + (1.0 - slips) * (age + dt);
         }
     }
@@ -277,6 +305,7 @@ mod tests {
             stiffness_n_per_m: 2e4,
             damping_n_s_per_m: 0.0,
             bristles_n_per_m: f64::INFINITY,
+            bristles_alone: false,
             branches: [(0.0, 1.0); 3],
             viscous: (0.0, 0.0),
             ageing: None,

@@ -90,6 +90,8 @@ pub struct Numbers {
     pub damping_n_s_per_m: f64,
     /// Stiffness of bristles in series with a block, N/m; infinite where there is no block.
     pub bristles_n_per_m: f64,
+    /// Whether bristles that follow the root are all there is.
+    pub bristles_alone: bool,
     /// Lateness of the channel beyond the rig file's, ms.
     pub late_ms: f64,
 }
@@ -238,6 +240,7 @@ impl<'a> Problem<'a> {
             stiffness_n_per_m: k,
             damping_n_s_per_m: c,
             bristles_n_per_m: n.bristles_n_per_m,
+            bristles_alone: n.bristles_alone && change.block.is_none(),
             branches: change.branches,
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,
@@ -319,12 +322,14 @@ impl<'a> Problem<'a> {
 
     /// Residuals over their deviations.
     pub fn residuals(&self, terms: &[usize], p: &[f64]) -> Vec<f64> {
-        self.scaled(&self.predict(terms, p).shown_nm)
+        self.scaled(&self.predict(terms, p))
     }
 
-    fn scaled(&self, shown: &[f64]) -> Vec<f64> {
+    fn scaled(&self, prediction: &Prediction) -> Vec<f64> {
         let usable = self.logs.iter().flat_map(|log| log.usable.iter());
-        let left = self.noise.innovations(self.measured().zip(shown).map(|(y, x)| y - x).collect());
+        let certainty = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
+        let left = self.measured().zip(&prediction.shown_nm).zip(certainty).map(|((y, x), c)| c * (y - x));
+        let left = self.noise.innovations(left.collect());
         left.into_iter()
             .zip(&self.noise.deviation)
             .zip(usable)
@@ -374,7 +379,7 @@ impl<'a> Problem<'a> {
             Some(m) => m.iter_mut().flatten().for_each(|m| *m += STEP),
             none => *none = Some(self.logs.iter().map(|log| vec![STEP; log.len()]).collect()),
         }
-        let moved = self.scaled(&self.predict_changed(&change, p).shown_nm);
+        let moved = self.scaled(&self.predict_changed(&change, p));
         Slopes { base, gain: moved.iter().zip(r).map(|(a, b)| (b - a) / STEP).collect() }
     }
 
