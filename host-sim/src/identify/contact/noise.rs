@@ -9,7 +9,7 @@
 //! | load between samples | a quarter of the load's change a sample |
 //! | form of the model | 0.4 % of the force |
 //! | noise of the slip speed | through g′, where the tip slips |
-//! | noise of the root's motion | through the stiffness, where it sticks: for [`Noise::named`] alone, since the likelihood has it in the residual's own scale ([`super::observer::Observed::certainty`]) |
+//! | noise of the root's motion | through the stiffness, where it sticks; of bristles without a block [`certainty`](super::observer::Observed::certainty) has it, and this only what is named |
 //! | transitions | 3 % of the load near a change between slip and stick |
 //!
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
@@ -17,7 +17,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::law::Curve;
+use super::law::Contact;
 use super::log::ContactLog;
 use super::problem::{FREEDOM, Prediction};
 use super::ringing::Filter;
@@ -58,7 +58,8 @@ pub struct Noise {
 
 impl Noise {
     /// Before anything is fitted.
-    pub fn new(logs: &[ContactLog], curve: &Curve, stiffness_n_per_m: f64, prediction: &Prediction) -> Self {
+    pub fn new(logs: &[ContactLog], contact: &Contact, prediction: &Prediction) -> Self {
+        let (curve, stiffness_n_per_m) = (&contact.curve, contact.stiffness_n_per_m);
         let mut sources = Vec::new();
         let mut from = 0;
         for (log, observed) in logs.iter().zip(&prediction.observed) {
@@ -112,8 +113,10 @@ impl Noise {
         factors[MODEL_FORM_SOURCE] = 0.0;
         noise.weigh(logs, &factors);
         noise.named = std::mem::take(&mut noise.deviation);
-        // The root's motion is in the residuals' scale already, with the stiffness of each point.
-        noise.sources.iter_mut().for_each(|n| n[ROOT_MOTION_SOURCE] = 0.0);
+        if contact.bristles_alone {
+            // It is in the residuals' scale, with the stiffness of each point.
+            noise.sources.iter_mut().for_each(|n| n[ROOT_MOTION_SOURCE] = 0.0);
+        }
         noise.weigh(logs, &[1.0; SOURCES]);
         noise
     }

@@ -59,8 +59,9 @@ pub struct Observed {
     pub slip_m_s: Vec<f64>,
     /// Share of slip in the blend, 0 to 1.
     pub sliding: Vec<f64>,
-    /// Deviation of the channel's noise over that of what the prediction leaves, 0 to 1: where the tip sticks, the noise of
-    /// the root's way comes through the stiffness. A stiffness of which that leaves nothing to see has no weight there.
+    /// Deviation of the channel's noise over that of what the prediction leaves, 0 to 1: where bristles are held, the noise
+    /// of the root's way comes through their stiffness. A stiffness of which that leaves nothing to see has no weight there.
+    /// 1 with a block, which is some hundred times softer.
     pub certainty: Vec<f64>,
 }
 
@@ -210,9 +211,6 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let threshold = drive.slip_threshold_m_s.max(SLIP_NOISES * slip_noise);
     let creep_noise = drive.noise.0.hypot(slip_noise);
     let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
-    // Variance of the held force over the channel's; a limit that noise smears is a logistic of the same deviation.
-    let held_variance = (gain / (1.0 - gain).max(1e-12)).min(1e12);
-    let smear = 3f64.sqrt() / std::f64::consts::PI * held_variance.sqrt() * drive.noise.1;
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
     let mut observed = start;
     let mut held = start;
@@ -259,14 +257,13 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let creep = (speed * speed - creep_noise * creep_noise).max(0.0).sqrt();
             let limit = loaded * contact.curve.at(creep, per_log, log_slowest);
             let towards = sigmoid((sticking.signum() * v / (0.1 * threshold) - 1.0) / WIDTH);
-            let width = smear.hypot(LIMIT_WIDTH * limit);
-            let over = (sticking.abs() - limit) / width;
+            let over = (sticking.abs() - limit) / (LIMIT_WIDTH * limit);
             let beyond = if over > 30.0 {
                 sticking.abs() - limit
             } else if over < -30.0 {
                 0.0
             } else {
-                width * over.exp().ln_1p()
+                LIMIT_WIDTH * limit * over.exp().ln_1p()
             };
             let breaks = sigmoid(over) * towards;
             sticking -= sticking.signum() * beyond * towards;
@@ -277,8 +274,6 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
                 held[1 + b] = follows * observed[1 + b] + (1.0 - follows) * (held[1 + b] + moved) * branch[b];
             }
             out.force_n[i] = slips * sliding + (1.0 - slips) * sticking;
-            let held_share = 1.0 - follows;
-            out.certainty[i] = 1.0 / (1.0 + held_share * held_share * held_variance).sqrt();
         } else {
             held = observed;
             out.force_n[i] = sliding;

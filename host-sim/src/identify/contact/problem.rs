@@ -205,7 +205,7 @@ impl<'a> Problem<'a> {
         let change = self.change(terms, p);
         let contact = self.contact(&self.baseline.numbers(p), &change);
         let prediction = self.predict_changed(&change, p);
-        Noise::new(self.logs, &contact.curve, contact.stiffness_n_per_m, &prediction)
+        Noise::new(self.logs, &contact, &prediction)
     }
 
     /// With a noise model that was fitted before.
