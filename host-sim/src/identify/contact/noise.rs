@@ -36,6 +36,8 @@ const SOURCES: usize = 8;
 const MODEL_FORM_SOURCE: usize = 4;
 /// Place of the root's motion through the stiffness.
 const ROOT_MOTION_SOURCE: usize = 6;
+/// Least certainty of a sample that takes part: the way's noise is up to three quarters of the variance.
+const LEAST_CERTAINTY: f64 = 0.5;
 /// Frequency below which effects live, Hz; above it residuals only tell how white they are.
 const SLOW_HZ: f64 = 30.0;
 
@@ -44,6 +46,9 @@ const SLOW_HZ: f64 = 30.0;
 pub struct Noise {
     /// Deviation of each sample, N m.
     pub deviation: Vec<f64>,
+    /// Whether a sample takes part: not where held bristles show the noise of the root's way and little else. It is the same for
+    /// every hypothesis: one that is certain of a sample would pay for it, and one that is not would not.
+    pub known: Vec<bool>,
     /// n² of each source for each sample.
     sources: Vec<[f64; SOURCES]>,
     /// The filter of what swings in each log with the present deviations, and the log's length.
@@ -108,7 +113,9 @@ impl Noise {
             }
         }
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
-        let mut noise = Self { sources, temper: 3.0 / density, sensor_factor: 1.0, ..Self::default() };
+        let certainties = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
+        let known = certainties.map(|c| *c > LEAST_CERTAINTY).collect();
+        let mut noise = Self { sources, known, temper: 3.0 / density, sensor_factor: 1.0, ..Self::default() };
         let mut factors = [1.0; SOURCES];
         factors[MODEL_FORM_SOURCE] = 0.0;
         noise.weigh(logs, &factors);

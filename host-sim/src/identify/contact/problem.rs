@@ -326,14 +326,14 @@ impl<'a> Problem<'a> {
     }
 
     fn scaled(&self, prediction: &Prediction) -> Vec<f64> {
-        let usable = self.logs.iter().flat_map(|log| log.usable.iter());
+        let usable = self.logs.iter().flat_map(|log| log.usable.iter()).zip(&self.noise.known);
         let certainty = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
         let left = self.measured().zip(&prediction.shown_nm).zip(certainty).map(|((y, x), c)| c * (y - x));
         let left = self.noise.innovations(left.collect());
         left.into_iter()
             .zip(&self.noise.deviation)
             .zip(usable)
-            .map(|((e, s), used)| if *used { e / s } else { 0.0 })
+            .map(|((e, s), (usable, known))| if *usable && *known { e / s } else { 0.0 })
             .collect()
     }
 
