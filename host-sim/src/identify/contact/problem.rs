@@ -240,7 +240,10 @@ impl<'a> Problem<'a> {
             stiffness_n_per_m: k,
             damping_n_s_per_m: c,
             bristles_n_per_m: n.bristles_n_per_m,
-            bristles_alone: n.bristles_alone && change.block.is_none(),
+            // Between samples far apart the root's way is a guess, and bristles that are followed in open loop need it.
+            bristles_alone: n.bristles_alone
+                && change.block.is_none()
+                && self.logs.iter().all(|log| log.grid.is_dense()),
             branches: change.branches,
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,
