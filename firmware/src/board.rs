@@ -9,6 +9,7 @@
 //! | TIM3 | time of the executor |
 //! | TIM4 | encoder of M1, 16 bit |
 //! | TIM6 | control period; its trigger output starts the scan |
+//! | ADC3 | the internal reference, once at the start |
 //! | ADC1, DMA1 stream 7 | scan of five channels; the end of the transfer starts the tick |
 //! | DAC1 | torque references |
 //! | USART3, DMA1 streams 0 and 1 | link |
@@ -109,6 +110,8 @@ pub const TICK_TIMER_HZ: u32 = 240_000_000;
 pub struct Board {
     /// ADC of the scan.
     pub adc: Peri<'static, peripherals::ADC1>,
+    /// ADC that reaches the internal reference.
+    pub reference_adc: Peri<'static, peripherals::ADC3>,
     /// Serial port with pins and DMA streams.
     pub link: LinkPort,
     /// Flash.
@@ -155,6 +158,7 @@ pub fn configure(p: Peripherals) -> Board {
     // PC0, PA3, PB1, PA6, PA0 (ADC1) and PA4, PA5 (DAC1) are analogue out of reset and stay so.
     Board {
         adc: p.ADC1,
+        reference_adc: p.ADC3,
         link: LinkPort { usart: p.USART3, rx: p.PD9, tx: p.PD8, tx_dma: p.DMA1_CH0, rx_dma: p.DMA1_CH1 },
         flash: p.FLASH,
     }

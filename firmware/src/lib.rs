@@ -19,6 +19,7 @@ pub mod log;
 pub mod memory;
 pub mod mpu;
 pub mod outputs;
+pub mod reference;
 pub mod restart;
 pub mod self_test;
 pub mod settings;

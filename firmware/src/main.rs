@@ -16,8 +16,8 @@ use rig_firmware::{adc_scan, encoders, log, memory, restart, tick, watchdog};
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
-    let Started { reset, crash_record, crystal, board } = start::start();
-    defmt::info!("start after {}", reset);
+    let Started { reset, crash_record, crystal, reference_mv, board } = start::start();
+    defmt::info!("start after {}, VREF+ {=u16} mV", reset, reference_mv);
     if let Some(record) = &crash_record {
         defmt::error!(
             "crash record of tick {=u64}: {}: {=str}",
@@ -46,7 +46,7 @@ async fn main(spawner: Spawner) {
         Ok(port) => port,
         Err(error) => panic!("the link's rate is not possible: {error:?}"),
     };
-    let identity = Identity { reset, crystal, crash_record };
+    let identity = Identity { reset, crystal, reference_mv, crash_record };
     let operator = Operator::new(identity, settings, config, ends.orders, ends.answers, ends.inputs);
     start_task(spawner, log::log(ends.events));
     start_task(spawner, link::send(tx, &mut buffers.sending, ends.rows, ends.health));

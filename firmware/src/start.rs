@@ -6,7 +6,7 @@
 //! tested is what is flashed.
 
 use crate::board::{self, Board};
-use crate::{clocks, crash_record, itcm, mpu, outputs, restart, supply};
+use crate::{clocks, crash_record, itcm, mpu, outputs, reference, restart, supply};
 use rig_link::message::{CrashRecord, ResetCause};
 
 /// What the start found.
@@ -17,6 +17,8 @@ pub struct Started {
     pub crash_record: Option<CrashRecord>,
     /// The clock comes from the 8 MHz of the ST-LINK.
     pub crystal: bool,
+    /// What the 3.3 V that every analogue code is a share of are worth, mV.
+    pub reference_mv: u16,
     /// Peripherals that drivers still need.
     pub board: Board,
 }
@@ -28,8 +30,9 @@ pub fn start() -> Started {
     let reset = restart::reset_cause();
     let crash_record = crash_record::take();
     let crystal = clocks::crystal_present();
-    let board = board::configure(clocks::start(crystal));
+    let mut board = board::configure(clocks::start(crystal));
     outputs::start();
+    let reference_mv = reference::measure(board.reference_adc.reborrow());
     clocks::yield_to_the_tick();
     supply::watch();
     if crystal {
@@ -37,7 +40,7 @@ pub fn start() -> Started {
     } else {
         defmt::warn!("no 8 MHz from the ST-LINK: times and speeds may be off by 1 %");
     }
-    Started { reset, crash_record, crystal, board }
+    Started { reset, crash_record, crystal, reference_mv, board }
 }
 
 /// Vectors, memory map, caches, cycle counter: first, as they trap what goes wrong from here on.

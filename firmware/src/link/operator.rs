@@ -33,6 +33,8 @@ pub struct Identity {
     pub reset: ResetCause,
     /// The clock comes from the crystal.
     pub crystal: bool,
+    /// VREF+ at the start, mV.
+    pub reference_mv: u16,
     /// The crash record from before.
     pub crash_record: Option<CrashRecord>,
 }
@@ -130,6 +132,7 @@ impl Operator {
             counts_per_rev: self.settings.counts_per_rev(),
             reset: self.identity.reset,
             crystal: self.identity.crystal,
+            reference_mv: self.identity.reference_mv,
             crash_record: self.identity.crash_record.is_some(),
         }
     }

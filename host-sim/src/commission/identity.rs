@@ -7,6 +7,7 @@ use super::{Commissioning, Stop};
 use crate::input_error::InputError;
 use crate::link::ask::check_hello;
 use crate::link::words;
+use crate::link::words::{REFERENCE_MV, in_volts};
 
 /// Random steps of each model: enough that every branch is taken, little enough to take a second on the chip.
 const STEPS: u32 = 200;
@@ -29,6 +30,14 @@ pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
         "crystal",
         hello.crystal,
         "times and speeds may be off by 1 %: look at the board's crystal",
+    );
+    let [least, most] = [REFERENCE_MV.start(), REFERENCE_MV.end()].map(|mv| in_volts(*mv));
+    c.check(
+        "3.3 V supply of the converters",
+        in_volts(hello.reference_mv),
+        &format!("{least} to {most}"),
+        REFERENCE_MV.contains(&hello.reference_mv),
+        "every analogue reading and torque reference is off by as much: look at the board's supply",
     );
     let different = differing_models(c)?;
     let found = if different.is_empty() {

@@ -1,5 +1,7 @@
 //! What the rig says, in words. Numbers this tool does not know are shown as numbers.
 
+use std::ops::RangeInclusive;
+
 use model_core::control::{Fault, Limit, Mode, Reason, Refusal};
 use model_core::extension::Extension;
 use model_core::friction::ModelKind;
@@ -74,6 +76,16 @@ fn refused(reason: u8, in_the_way: Option<u8>) -> String {
     format!("refused: {reason}{behind}")
 }
 
+/// VREF+ as the chip may find it, mV: its regulator is good to 2 %, and the chip's reference drifts by up to 15 mV of 1.216 V
+/// over temperature (DS12110 rev 11, table 117), 1.2 %; both together 3 %.
+pub const REFERENCE_MV: RangeInclusive<u16> = 3_201..=3_399;
+
+/// Millivolts as volts, with the unit.
+#[must_use]
+pub fn in_volts(millivolts: u16) -> String {
+    format!("{:.3} V", f64::from(millivolts) / 1000.0)
+}
+
 /// Who answered.
 #[must_use]
 pub fn hello(hello: &Hello) -> String {
@@ -86,7 +98,12 @@ pub fn hello(hello: &Hello) -> String {
         ResetCause::Other => "an unknown reset",
     };
     let clock = if hello.crystal { "" } else { "; without its crystal: times and speeds may be off by 1 %" };
-    format!("firmware {} build {build}, started by {reset}{clock}", hello.version)
+    let reference = if REFERENCE_MV.contains(&hello.reference_mv) {
+        String::new()
+    } else {
+        format!("; its 3.3 V are {}: analogue readings are off by as much", in_volts(hello.reference_mv))
+    };
+    format!("firmware {} build {build}, started by {reset}{clock}{reference}", hello.version)
 }
 
 /// The crash record from before its last restart.

@@ -10,6 +10,7 @@ use host_sim::link::procedure::Procedure;
 use host_sim::link::record::Record;
 use host_sim::link::rows::{self, Zero};
 use host_sim::link::run_experiment::{RunExperiment, RunOptions, RunRecord};
+use host_sim::link::words;
 use host_sim::lockstep::{self, Setup};
 use model_core::control::Fault;
 use rig_link::message::{Command, PROTOCOL_VERSION};
@@ -126,6 +127,17 @@ fn another_version_of_the_protocol_is_refused_with_both_numbers() {
         format!(
             "protocol = 99: the firmware speaks another version of the protocol; allowed: {PROTOCOL_VERSION}"
         )
+    );
+}
+
+#[test]
+fn a_supply_of_the_converters_that_is_off_is_told_with_its_volts() {
+    let (_, setup) = setup("fig20");
+    let mut rig = Rig::new(&setup);
+    assert!(!words::hello(&rig.hello).contains("3.3 V"));
+    rig.hello.reference_mv = 3_400;
+    assert!(
+        words::hello(&rig.hello).ends_with("; its 3.3 V are 3.400 V: analogue readings are off by as much")
     );
 }
 

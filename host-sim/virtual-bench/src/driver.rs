@@ -294,6 +294,7 @@ impl BenchDriver {
                 part.encoders[motor as usize].disturb(Disturbance { at: stop.at, width_ns });
             }
             Action::Reference(motor, wire) => self.outside.references[motor as usize] = wire,
+            Action::AnalogSupply(millivolt) => part.set_analog_supply(millivolt),
             Action::AdcScanCut => part.adc1.cut_next_scan(),
             Action::SerialStreamsLockUp => {
                 interference::lock_up_serial_streams(part, stop.at);

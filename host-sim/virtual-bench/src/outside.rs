@@ -133,6 +133,8 @@ pub enum Action {
     LinkSilent(bool),
     /// So many bytes in a million reach the chip with a framing error and flipped bits.
     LinkGarbled(u32),
+    /// The 3.3 V, of which every analogue code is a share, are these, in mV.
+    AnalogSupply(u32),
     /// The chip's supply is cut or comes back. Memory other than flash is lost.
     Power(bool),
     /// A flash word is found so after a power cut: at this address, these bytes.

@@ -15,7 +15,7 @@ use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 /// Rises whenever an old peer would misread a message.
-pub const PROTOCOL_VERSION: u16 = 4;
+pub const PROTOCOL_VERSION: u16 = 5;
 
 /// The most bytes of a capture in one answer.
 pub const CAPTURE_CHUNK: usize = 480;
@@ -239,6 +239,8 @@ pub struct Hello {
     pub crystal: bool,
     /// There is a crash record from before the last restart.
     pub crash_record: bool,
+    /// VREF+, of which every analogue code is a share, as the chip measured it at its start, mV; 3300 is right.
+    pub reference_mv: u16,
 }
 
 /// Why the chip started.

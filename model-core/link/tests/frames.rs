@@ -4,7 +4,7 @@
 use heapless::{String, Vec};
 use proptest::prelude::*;
 use rig_link::frame::{FrameError, MAX_FRAME, Receiver, encode};
-use rig_link::message::{Answer, Command, Message, Rejection, Request};
+use rig_link::message::{Answer, Command, Hello, Message, Rejection, Request, ResetCause};
 use rig_link::program::{ProgramMode, ProgramSegment, ProgramShape};
 use rig_link::telemetry::{Health, TelemetryRow};
 
@@ -172,9 +172,9 @@ fn a_telemetry_row_at_1_khz_uses_less_than_two_thirds_of_the_line() {
 /// The wire format is the order and the types of the members: who changes them raises `PROTOCOL_VERSION` and
 /// writes the new bytes here.
 #[test]
-fn the_bytes_of_version_4_stay_as_they_are() {
+fn the_bytes_of_version_5_stay_as_they_are() {
     use rig_link::message::PROTOCOL_VERSION;
-    assert_eq!(PROTOCOL_VERSION, 4);
+    assert_eq!(PROTOCOL_VERSION, 5);
     let hex = |bytes: std::vec::Vec<u8>| {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect::<std::string::String>()
     };
@@ -182,6 +182,22 @@ fn the_bytes_of_version_4_stay_as_they_are() {
     assert_eq!(request(Command::Hello), "03ac0205941f151d00");
     assert_eq!(request(Command::SettingSet { key: 200, value: 32790.5 }), "08ac020cc80180160347fc038dbc00");
     assert_eq!(request(Command::Restart), "08ac021954b77e7900");
+    let hello = Hello {
+        protocol: PROTOCOL_VERSION,
+        settings_schema: 3,
+        version: "0.1.0".try_into().unwrap(),
+        tick_hz: 10_000,
+        counts_per_rev: 480_000,
+        reset: ResetCause::Watchdog,
+        crystal: true,
+        reference_mv: 3_290,
+        ..Hello::default()
+    };
+    let answer = Message::Answer { id: 300, answer: Answer::Hello(hello) };
+    assert_eq!(
+        hex(frame_of(&answer)),
+        "010cac0201050305302e312e300101010101010101010101010101010101010108904e80a61d030107da194a0bc18400"
+    );
     let row = TelemetryRow {
         sequence: 7,
         tick: 70_000,

@@ -81,6 +81,7 @@ impl Rig {
                 settings_schema: SCHEMA_VERSION,
                 tick_hz: 10_000,
                 crystal: true,
+                reference_mv: 3_300,
                 ..Hello::default()
             },
             lose: |_| false,

@@ -38,7 +38,7 @@ const CHANGED_WHILE_ARMED: &str =
     "configuration was written while ADSTART stands (RM0433 25.6), so it stays as it is";
 const DISABLED_WHILE_ARMED: &str = "ADDIS was written while ADSTART stands, so it does nothing";
 
-/// Full scale of the inputs in the unit of [`TriggeredAdc::set_input`].
+/// Full scale of the inputs in the unit of [`TriggeredAdc::set_input`], with the rail as it should be.
 pub const REFERENCE_MICROVOLT: u32 = 3_300_000;
 
 /// `TIM6_TRGO` as `EXTSEL` numbers it, RM0433, ADC external triggers.
@@ -111,6 +111,11 @@ impl TriggeredAdc {
         if let Some(channel) = Channel::new(channel) {
             self.adc.set_input(channel, microvolt);
         }
+    }
+
+    /// VREF+ from now on, µV.
+    pub(super) fn set_reference(&mut self, microvolt: u32) {
+        self.adc.set_reference(microvolt);
     }
 
     /// The fault "the converter no longer starts", or its end.

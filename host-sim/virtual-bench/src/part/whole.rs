@@ -4,7 +4,7 @@
 //! stays through it: crystals, rails, the far ends of the serial ports, levels at pins, voltages at the
 //! converter's inputs, edges under way. So do the option bytes, which are flash.
 
-use super::adc_trigger::TriggeredAdc;
+use super::adc_trigger::{REFERENCE_MICROVOLT, TriggeredAdc};
 use super::dac::Dac;
 use super::encoder_timer::EncoderTimer;
 use super::iwdg::Iwdg;
@@ -12,13 +12,14 @@ use super::trigger_timer::TriggerTimer;
 use rigless::device::{Device, ErasedDevice, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
+use rigless::soc::stm32h743::peripherals::adc::Converter;
 use rigless::soc::stm32h743::peripherals::tim::{TIMERS, Timer};
 use rigless::soc::{Bus, Error};
 use rigless::store;
 use rigless::time::VirtualNanos;
 
 /// Rails of the NUCLEO board, and its clock sources: 8 MHz from the ST-LINK, and the 32 kHz crystal.
-const RAIL_MILLIVOLT: u32 = 3300;
+const RAIL_MILLIVOLT: u32 = REFERENCE_MICROVOLT / 1000;
 const HSE_HZ: u64 = 8_000_000;
 const LSE_HZ: u64 = 32_768;
 
@@ -47,27 +48,9 @@ impl Motor {
 /// Instances that hear every request of every other one and that the firmware leaves alone. Their models would take a
 /// fifth of the emulator's time to find that nothing concerns them. Without a model, an access to one is a gap
 /// (`gaps.rs`), and the run fails.
-const LEFT_ALONE: [&str; 20] = [
-    "TIM1",
-    "TIM5",
-    "TIM8",
-    "TIM12",
-    "TIM13",
-    "TIM14",
-    "TIM15",
-    "TIM16",
-    "TIM17",
-    "SPI1",
-    "SPI2",
-    "SPI3",
-    "SPI4",
-    "SPI5",
-    "SPI6",
-    "DMA2",
-    "BDMA",
-    "DMAMUX2",
-    "ADC3",
-    "ADC3_Common",
+const LEFT_ALONE: [&str; 18] = [
+    "TIM1", "TIM5", "TIM8", "TIM12", "TIM13", "TIM14", "TIM15", "TIM16", "TIM17", "SPI1", "SPI2", "SPI3",
+    "SPI4", "SPI5", "SPI6", "DMA2", "BDMA", "DMAMUX2",
 ];
 
 /// Slots of the instances that have a model of ours, and of the serial port.
@@ -146,6 +129,13 @@ impl Part {
         })
     }
 
+    /// The analogue rail from now on, which is VREF+ of every converter.
+    pub fn set_analog_supply(&mut self, millivolt: u32) {
+        self.soc.set_analog_supply(millivolt);
+        self.soc.adc[Converter::Adc3 as usize].set_reference(millivolt);
+        self.adc1.set_reference(1000 * millivolt);
+    }
+
     /// The 8 MHz stop, and the clock security system notices; its interrupt the emulator leaves out.
     pub fn fail_crystal(&mut self, at: VirtualNanos) {
         // The model and its registers are lent apart from each other only while the model is taken out.
@@ -169,7 +159,9 @@ impl Part {
         let (hse, lse) = self.soc.rcc.crystals();
         fresh.rcc.attach_crystals(hse, lse);
         fresh.set_supply(self.soc.pwr.supply());
-        fresh.set_analog_supply(self.soc.pwr.analog_supply());
+        let analog = self.soc.pwr.analog_supply();
+        fresh.set_analog_supply(analog);
+        fresh.adc[Converter::Adc3 as usize].set_reference(analog);
         let options = self.soc.flash.committed_options();
         let (flash, registers) = fresh.program();
         flash.keep_options(options, registers);

@@ -324,6 +324,25 @@ fn a_supply_that_falls_makes_safe() {
 }
 
 #[test]
+fn the_chip_tells_what_its_3_3_v_are_worth() {
+    let told = |millivolt| {
+        let hello = from(State::Idle, |endpoint, listener| {
+            endpoint.act(Action::AnalogSupply(millivolt))?;
+            endpoint.act(Action::ResetPin)?;
+            listener.listen(endpoint, endpoint.now_ns() + 500_000_000)?;
+            listener.ask(endpoint, &Command::Hello)
+        })
+        .operator;
+        let Answer::Hello(hello) = hello else { panic!("{hello:?}") };
+        hello.reference_mv
+    };
+    // A code of its reference is 0.15 mV of the supply.
+    for millivolt in [3_300, 3_150, 3_420] {
+        assert!(told(millivolt).abs_diff(millivolt as u16) <= 2, "{} of {millivolt}", told(millivolt));
+    }
+}
+
+#[test]
 fn the_self_test_of_the_board_passes_with_the_shipped_start() {
     let elf = firmware_build::release_elf_of(firmware_build::SELF_TEST).unwrap();
     let program = Firmware::read(&elf).unwrap();
