@@ -13,15 +13,31 @@ use super::contact::noise::slow_share;
 use super::contact::problem::{FREEDOM, SCALES, TYPICAL_SCALE, log_mean_exp};
 use super::filters::{self, local_maximum, median_magnitude};
 use super::linear::{self, dot};
+use super::same_amplitude::{Seen, log_ratio};
 use super::term::Parameter;
 
 /// The disc where it does not move as the motor does.
 #[derive(Debug, Clone)]
 pub struct DiscMotion {
-    /// Its angle in each log.
+    /// Its angle in each log with all of the form's parameters at 0.
     pub angle_rad: Vec<Vec<f64>>,
+    /// What a unit of each of the form's parameters adds to it in each log; empty where none does.
+    pub angle_per_unit: Vec<Vec<Vec<f64>>>,
     /// Error of its speed for an error of the torque that drives it, rad/s per N m.
     pub speed_per_torque: f64,
+}
+
+impl DiscMotion {
+    /// Its angle in each log with these values of the form's parameters.
+    pub fn angle(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let mut angle_rad = self.angle_rad.clone();
+        for (value, logs) in values.iter().zip(&self.angle_per_unit) {
+            for (angle_rad, unit) in angle_rad.iter_mut().zip(logs) {
+                angle_rad.iter_mut().zip(unit).for_each(|(angle, unit)| *angle += value * unit);
+            }
+        }
+        angle_rad
+    }
 }
 
 /// A form of an effect in a balance.
@@ -39,6 +55,8 @@ pub struct Alternative {
     pub response: Option<Vec<f64>>,
     /// Motion of the disc, where this form parts it from the motor's.
     pub disc: Option<DiscMotion>,
+    /// Waves whose amplitude is the same in all logs: of each the places of cosine and sine among the parameters, log by log.
+    pub same_amplitude: Vec<Vec<[usize; 2]>>,
     /// Base columns that this form replaces, by their place.
     pub replaces: Vec<(usize, Vec<f64>)>,
     /// Change of the prior means of base parameters.
@@ -59,6 +77,7 @@ impl Alternative {
             columns,
             response: None,
             disc: None,
+            same_amplitude: Vec::new(),
             replaces: Vec::new(),
             base_shift: Vec::new(),
             constants: Vec::new(),
@@ -107,6 +126,8 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
+/// A set may leave so many times what the base alone does: rows that nothing explains move a little with any fit.
+const NOT_WORSE: f64 = 1.05;
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 
@@ -123,6 +144,21 @@ pub struct Solved {
     pub log_evidence: f64,
     /// Residuals of all points, in the response's unit.
     pub residual: Vec<f64>,
+}
+
+impl Solved {
+    /// The forms of its set, each with the values of its parameters; `base` parameters stand before them.
+    pub fn forms<'s>(
+        &'s self,
+        alternatives: &'s [Alternative],
+        base: usize,
+    ) -> impl Iterator<Item = (&'s Alternative, &'s [f64])> {
+        self.set.iter().scan(base, |at, chosen| {
+            let form = &alternatives[*chosen];
+            let from = std::mem::replace(at, *at + form.parameters.len());
+            Some((form, &self.p[from..*at]))
+        })
+    }
 }
 
 impl Balance {
@@ -223,6 +259,12 @@ impl Balance {
         let misfit =
             0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.temper;
         let free: Vec<usize> = (0..n).filter(|i| p[*i] > parameters[*i].lower).collect();
+        let mut posterior = h.clone();
+        for (i, q) in parameters.iter().enumerate() {
+            posterior[(i, i)] += 1.0 / q.sd.powi(2);
+        }
+        let covariance = linear::factor(&posterior).inverse();
+        let waves = self.waves(&chosen, &p, &covariance);
         let log_evidence = log_prior
             + log_mean_exp(SCALES.iter().map(|scale| {
                 let sd = |i: usize| {
@@ -232,19 +274,37 @@ impl Balance {
                 let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
                     h[(free[a], free[b])] * sd(free[a]) * sd(free[b]) + f64::from(u8::from(a == b))
                 });
-                -misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
+                let one_amplitude: f64 = waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
+                one_amplitude - misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
             }));
-        let mut posterior = h;
-        for (i, q) in parameters.iter().enumerate() {
-            posterior[(i, i)] += 1.0 / q.sd.powi(2);
-        }
-        let covariance = linear::factor(&posterior).inverse();
         let mut residual = response;
         for (c, p) in columns.iter().zip(&p) {
             residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
         }
         let std = (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
         Solved { set: set.to_vec(), p, std, log_evidence, residual }
+    }
+
+    /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.
+    fn waves(&self, chosen: &[&Alternative], p: &[f64], covariance: &DMatrix<f64>) -> Vec<(Vec<Seen>, f64)> {
+        let mut out = Vec::new();
+        let mut at = self.base.len();
+        for alternative in chosen {
+            for wave in &alternative.same_amplitude {
+                let seen = wave.iter().map(|places| {
+                    let [c, s] = places.map(|place| at + place);
+                    let determinant = covariance[(c, c)] * covariance[(s, s)] - covariance[(c, s)].powi(2);
+                    Seen {
+                        amplitude: p[c].hypot(p[s]),
+                        precision: determinant.max(f64::MIN_POSITIVE).sqrt().recip(),
+                    }
+                });
+                let sd = wave.first().map_or(0.0, |[c, _]| alternative.parameters[*c].sd);
+                out.push((seen.collect(), sd));
+            }
+            at += alternative.parameters.len();
+        }
+        out
     }
 
     /// The used rows of each log, as places in all points.
@@ -267,6 +327,12 @@ impl Balance {
         (self.used.iter().map(|&i| values[i] * values[i]).sum::<f64>() / self.used.len().max(1) as f64).sqrt()
     }
 
+    /// RMS over the used rows, in deviations.
+    fn weighted_rms(&self, values: &[f64]) -> f64 {
+        let sum: f64 = self.used.iter().map(|&i| (values[i] / self.deviation[i]).powi(2)).sum();
+        (sum / self.used.len().max(1) as f64).sqrt()
+    }
+
     /// RMS of the difference of two residuals over the used rows.
     pub fn difference(&self, a: &[f64], b: &[f64]) -> f64 {
         let sum: f64 = self.used.iter().map(|&i| (a[i] - b[i]).powi(2)).sum();
@@ -276,8 +342,9 @@ impl Balance {
     /// Takes noise level and effective sample size from the residuals of a solved set.
     pub fn refit_noise(&mut self, solved: &Solved) {
         let r = |i: &usize| solved.residual[*i] / self.deviation[*i];
-        // Median magnitude of a normal deviate is 0.6745.
-        let factor = (median_magnitude(self.used.iter().map(r)) / 0.6745).max(0.3);
+        // Median magnitude of a normal deviate is 0.6745. Not below the sensors' noise: where most rows rest, the angle's
+        // noise is not in them, and a deviation taken from them makes outliers of those that move.
+        let factor = (median_magnitude(self.used.iter().map(r)) / 0.6745).max(1.0);
         let pull: Vec<f64> = self
             .used
             .iter()
@@ -315,6 +382,10 @@ pub fn search(balance: &mut Balance, alternatives: &[Alternative], most: usize) 
             }
             let mut solved: Vec<Solved> =
                 sets.par_iter().map(|set| balance.solve(alternatives, set)).collect();
+            // Student's t forgives what is far off. A form that takes noise out of most rows and leaves a few much worse is
+            // not an explanation of them.
+            let most = balance.weighted_rms(&found[0].residual) * NOT_WORSE;
+            solved.retain(|s| balance.weighted_rms(&s.residual) < most);
             solved.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
             // The best shape of each combination of effects leads on.
             let effects = |set: &[usize]| {
@@ -347,4 +418,76 @@ pub fn search(balance: &mut Balance, alternatives: &[Alternative], most: usize) 
         all = found;
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROWS: usize = 4000;
+
+    /// Deterministic noise of deviation one.
+    fn noise() -> Vec<f64> {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..ROWS).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+    }
+
+    /// A balance with one base column, a slow swing, and rows whose named deviation is one.
+    fn balance(response: Vec<f64>) -> Balance {
+        let column = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
+        let log =
+            LogRows { width: 1.0, step_s: 1e-3, left_out: vec![false; ROWS], noise: Box::new(|_| vec![1.0]) };
+        Balance::new(response, vec![(Parameter::amplitude("swing", 10.0), column)], &[log], 1.0)
+    }
+
+    #[test]
+    fn rows_that_rest_do_not_sharpen_those_that_move() {
+        let mut quiet = noise();
+        quiet.iter_mut().take(ROWS * 9 / 10).for_each(|r| *r = 0.0);
+        let mut balance = balance(quiet);
+        let solved = balance.solve(&[], &[]);
+        balance.refit_noise(&solved);
+        assert_eq!(balance.deviation, balance.first_deviation);
+        // Rows with more noise than is named widen it.
+        let mut balance = self::balance(noise().iter().map(|r| 3.0 * r).collect());
+        let solved = balance.solve(&[], &[]);
+        balance.refit_noise(&solved);
+        assert!((balance.deviation[ROWS / 2] - 3.0).abs() < 0.2, "{}", balance.deviation[ROWS / 2]);
+    }
+
+    #[test]
+    fn a_form_that_takes_noise_out_of_most_rows_and_spoils_a_few_is_no_explanation() {
+        let noise = noise();
+        let spoils = |every: usize| {
+            let added = noise.iter().enumerate().map(|(i, r)| {
+                let spoilt = every != 0 && i % every == 0;
+                -0.5 * r + if spoilt { 20.0 } else { 0.0 }
+            });
+            Alternative {
+                response: Some(added.collect()),
+                ..Alternative::columns("smooths", Vec::new(), Vec::new())
+            }
+        };
+        let found = |every| {
+            let sets = search(&mut balance(noise.clone()), &[spoils(every)], 1);
+            assert!(sets.iter().any(|s| s.set.is_empty()));
+            sets.iter().any(|s| !s.set.is_empty())
+        };
+        assert!(found(0) && !found(50));
+    }
+
+    #[test]
+    fn a_disc_turns_by_its_own_angle_and_what_the_parameters_add() {
+        let disc = DiscMotion {
+            angle_rad: vec![vec![1.0, 2.0], vec![3.0]],
+            angle_per_unit: vec![vec![vec![0.1, 0.2], vec![0.0]], vec![vec![0.0, 0.0], vec![1.0]]],
+            speed_per_torque: 0.0,
+        };
+        assert_eq!(disc.angle(&[10.0, -1.0]), [vec![2.0, 4.0], vec![2.0]]);
+        assert_eq!(disc.angle(&[]), disc.angle_rad);
+    }
 }

@@ -4,7 +4,7 @@
 //! the training logs' values. What belongs to one log alone, as the phase of a pattern under an incremental encoder, is
 //! not known for another one and left out.
 
-use super::balance::{Alternative, Balance};
+use super::balance::{Alternative, Balance, Solved};
 use super::contact::log::ContactLog;
 use super::contact::problem::Problem;
 use super::drive::{self, DriveLog, DriveScales};
@@ -117,8 +117,9 @@ pub fn errors(
                     Some(contact.logs.clone())
                 } else {
                     let (_, fixed) = drive_alternatives(found, drive, drives, Some(rig));
-                    judge::following(&prepared, fixed.iter(), judge::torque_error(drive))
-                        .map(|(logs, _)| logs)
+                    let solved = &drive.solved[found.place(Part::Drive).unwrap_or(0)];
+                    let forms = known_forms(drive, solved, &fixed).filter_map(|(form, p)| Some((form, p?)));
+                    judge::following(&prepared, forms, judge::torque_error(drive)).map(|(logs, _)| logs)
                 }
             }
             _ => None,
@@ -199,7 +200,7 @@ fn extended_residual(
     balance: &Balance,
     fixed: &[Alternative],
 ) -> (Vec<f64>, Vec<f64>) {
-    let base_values = |solved: &super::balance::Solved| solved.p[..balance.base.len()].to_vec();
+    let base_values = |solved: &Solved| solved.p[..balance.base.len()].to_vec();
     let take = |values: &[f64], response: Vec<f64>, columns: Vec<&Vec<f64>>| {
         let mut r = response;
         for (c, p) in columns.into_iter().zip(values) {
@@ -214,31 +215,38 @@ fn extended_residual(
     let mut response = balance.response.clone();
     let mut columns: Vec<&Vec<f64>> = balance.base.iter().map(|b| &b.1).collect();
     let mut values = base_values(solved);
-    let mut at = balance.base.len();
-    for chosen in &solved.set {
-        let own = &part.alternatives[*chosen];
-        let count = own.parameters.len();
-        let other = fixed.iter().find(|a| {
-            a.effect == own.effect
-                && a.parameters.len() == count
-                && a.parameters.iter().zip(&own.parameters).all(|(a, b)| a.name == b.name)
-        });
-        if let Some(other) = other {
-            if let Some(added) = &other.response {
-                response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
-            }
-            for (place, column) in &other.replaces {
-                columns[*place] = column;
-            }
-            let one_log = other.parameters.iter().any(|p| p.name.contains("_log"));
-            if !one_log {
-                columns.extend(other.columns.iter());
-                values.extend_from_slice(&solved.p[at..at + count]);
-            }
+    for (form, p) in known_forms(part, solved, fixed) {
+        if let Some(added) = &form.response {
+            response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
         }
-        at += count;
+        for (place, column) in &form.replaces {
+            columns[*place] = column;
+        }
+        if let Some(p) = p {
+            columns.extend(form.columns.iter());
+            values.extend_from_slice(p);
+        }
     }
     (base, take(&values, response, columns))
+}
+
+/// The forms of a training set in another balance, with the values of their parameters; those that each log has for itself
+/// have none there.
+fn known_forms<'f>(
+    part: &'f Linear,
+    solved: &'f Solved,
+    fixed: &'f [Alternative],
+) -> impl Iterator<Item = (&'f Alternative, Option<&'f [f64]>)> {
+    solved.forms(&part.alternatives, part.balance.base.len()).filter_map(|(own, p)| {
+        let same = |a: &&Alternative| {
+            a.effect == own.effect
+                && a.parameters.len() == own.parameters.len()
+                && a.parameters.iter().zip(&own.parameters).all(|(a, b)| a.name == b.name)
+        };
+        let form = fixed.iter().find(same)?;
+        let one_log = form.parameters.iter().any(|p| p.name.contains("_log"));
+        Some((form, (!one_log).then_some(p)))
+    })
 }
 
 fn linear_errors(

@@ -359,8 +359,8 @@ pub fn judge(
         // The motion with which the baseline leaves less is the better known one.
         let mut disc_cause = None;
         let parted = drive.as_ref().and_then(|drive| {
-            let best = drive.solved.first()?;
-            following(&logs, best.set.iter().map(|a| &drive.alternatives[*a]), torque_error(drive))
+            let forms = drive.solved.first()?.forms(&drive.alternatives, drive.balance.base.len());
+            following(&logs, forms, torque_error(drive))
         });
         if let Some((following, effect)) = parted {
             let (residual_nm, as_logged) = left_by_baseline(&logs, &baseline);
@@ -448,16 +448,18 @@ pub fn torque_error(drive: &Linear) -> f64 {
     drive.rest(0).size * drive.balance.scale
 }
 
-/// The logs with the disc's own motion, where one of these forms parts it from the motor's encoder; the cause's id.
+/// The logs with the disc's own motion, where one of these forms, with these values, parts it from the motor's encoder; the
+/// cause's id.
 pub fn following<'f>(
     logs: &[ContactLog],
-    mut forms: impl Iterator<Item = &'f Alternative>,
+    mut forms: impl Iterator<Item = (&'f Alternative, &'f [f64])>,
     torque_error_nm: f64,
 ) -> Option<(Vec<ContactLog>, &'static str)> {
-    let (effect, disc) = forms.find_map(|form| Some((form.effect, form.disc.as_ref()?)))?;
+    let (effect, disc, values) =
+        forms.find_map(|(form, values)| Some((form.effect, form.disc.as_ref()?, values)))?;
     let mut logs = logs.to_vec();
-    for (log, angle_rad) in logs.iter_mut().zip(&disc.angle_rad) {
-        log.follow(angle_rad, disc.speed_per_torque * torque_error_nm);
+    for (log, angle_rad) in logs.iter_mut().zip(disc.angle(values)) {
+        log.follow(&angle_rad, disc.speed_per_torque * torque_error_nm);
     }
     Some((logs, effect))
 }

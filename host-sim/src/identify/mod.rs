@@ -22,6 +22,7 @@ pub mod normal_load;
 pub mod page;
 pub mod rest;
 pub mod results;
+mod same_amplitude;
 pub mod spectrum;
 pub mod term;
 pub mod two_mass;

@@ -153,7 +153,11 @@ fn alternative(
         form: format!("{:.0} Hz, gap {:.2e} rad", numbers.mode_hz, numbers.gap_rad),
         response: Some(added),
         // A torque error near the mode, where it lasts longest.
-        disc: Some(DiscMotion { angle_rad: positions, speed_per_torque: 1.0 / (disc * omega) }),
+        disc: Some(DiscMotion {
+            angle_rad: positions,
+            angle_per_unit: Vec::new(),
+            speed_per_torque: 1.0 / (disc * omega),
+        }),
         base_shift: vec![(INERTIA, -disc)],
         constants,
         log_prior: SHAPE,

@@ -1,7 +1,9 @@
 //! `encoder_eccentricity`: once-per-revolution error of measured angle and speed.
+//!
+//! The disc then turns by the measured angle less the error, in the contact too: what rubs knows nothing of the encoder.
 
 use super::{About, DriveView, Effect};
-use crate::identify::balance::Alternative;
+use crate::identify::balance::{Alternative, DiscMotion};
 use crate::identify::filters::gaussian;
 use crate::identify::term::Parameter;
 
@@ -34,25 +36,44 @@ impl Effect for EncoderEccentricity {
 
 impl EncoderEccentricity {
     fn alternative(&self, view: &DriveView<'_>, form: &str, logs: &[Option<usize>]) -> Alternative {
-        let (mut columns, mut parameters) = (Vec::new(), Vec::new());
+        let (mut columns, mut parameters, mut angle_per_unit) = (Vec::new(), Vec::new(), Vec::new());
         for only in logs {
             let name_of_log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
             // A tilted disc adds a second harmonic, a fifth of the first at most.
             for (name, order, sine) in [("cos", 1, false), ("sin", 1, true), ("cos", 2, false), ("sin", 2, true)] {
                 let turns = f64::from(order);
-                let column = view.logs.iter().enumerate().flat_map(|(at, log)| {
-                    if only.is_some_and(|only| only != at) {
-                        return vec![0.0; log.len()];
-                    }
-                    let wave: Vec<f64> = log.position.iter().map(|x| if sine { (turns * x).sin() } else { (turns * x).cos() }).collect();
+                let waves: Vec<Vec<f64>> = view
+                    .logs
+                    .iter()
+                    .enumerate()
+                    .map(|(at, log)| {
+                        let acts = only.is_none_or(|only| only == at);
+                        let wave = |x: &f64| if sine { (turns * x).sin() } else { (turns * x).cos() };
+                        log.position.iter().map(|x| if acts { wave(x) } else { 0.0 }).collect()
+                    })
+                    .collect();
+                let column = view.logs.iter().zip(&waves).flat_map(|(log, wave)| {
                     let dt = log.grid.step_s;
-                    gaussian(&wave, log.width, 2).iter().map(|d| view.inertia * d / (dt * dt)).collect()
+                    gaussian(wave, log.width, 2).into_iter().map(move |d| view.inertia * d / (dt * dt))
                 });
                 columns.push(column.collect());
+                angle_per_unit.push(waves);
                 let large = if order == 1 { LARGE_RAD } else { 0.2 * LARGE_RAD };
                 parameters.push(Parameter::amplitude(format!("{name}_{order}_rad{name_of_log}"), large));
             }
         }
-        Alternative { form: form.into(), ..Alternative::columns(self.id(), parameters, columns) }
+        let disc = DiscMotion {
+            angle_rad: view.logs.iter().map(|log| log.position.clone()).collect(),
+            angle_per_unit,
+            // The error is known to its own share, whatever the torque's.
+            speed_per_torque: 0.0,
+        };
+        // Cosine and sine of the first, then of the second harmonic, log after log.
+        let same_amplitude = if logs.len() > 1 {
+            [0, 2].map(|harmonic| (0..logs.len()).map(|log| [4 * log + harmonic, 4 * log + harmonic + 1]).collect()).to_vec()
+        } else {
+            Vec::new()
+        };
+        Alternative { form: form.into(), disc: Some(disc), same_amplitude, ..Alternative::columns(self.id(), parameters, columns) }
     }
 }

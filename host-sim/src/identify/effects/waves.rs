@@ -194,6 +194,19 @@ impl Waves<'_> {
                 }
             }
         }
+        let orders_count = orders.len();
+        // In the order in which the parameters stand: log after log, order after order, cosine and sine.
+        let same_amplitude = if own_phase && self.positions.len() > 1 {
+            let places = |order: usize| {
+                (0..self.positions.len()).map(move |log| {
+                    let first = 2 * (log * orders_count + order);
+                    [first, first + 1]
+                })
+            };
+            (0..orders_count).map(|order| places(order).collect()).collect()
+        } else {
+            Vec::new()
+        };
         let constant = |(i, k): (usize, &f64)| {
             if self.rotary {
                 (format!("order_{}", i + 1), *k)
@@ -202,10 +215,11 @@ impl Waves<'_> {
             }
         };
         Alternative {
-            form: format!("{} orders, {form}", orders.len()),
+            form: format!("{orders_count} orders, {form}"),
+            same_amplitude,
             constants: orders.iter().enumerate().map(constant).collect(),
             // The orders were chosen among so many.
-            log_prior: -(orders.len() as f64) * (candidates.max(1) as f64).ln(),
+            log_prior: -(orders_count as f64) * (candidates.max(1) as f64).ln(),
             ..Alternative::columns(self.effect, parameters, columns)
         }
     }
