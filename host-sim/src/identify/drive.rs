@@ -8,7 +8,7 @@
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::contact::log::unwrapped;
-use super::filters::{gaussian, largest_change, rms, steps, white_share};
+use super::filters::{gaussian, largest_change, rms, white_share};
 use super::grid::Grid;
 use super::noise;
 use super::term::Parameter;
@@ -280,18 +280,12 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let effort_change = largest_change(&log.effort, log.width);
     let friction_change =
         log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| largest_change(f, log.width));
-    // The same for what swings faster than the filter lets pass: a limit cycle's harmonics beyond half the rate fold back to
-    // where it does.
-    let swings = steps(&log.effort, log.width);
-    let friction_swings = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| steps(f, log.width));
-    let folded = BETWEEN_SAMPLES * white_share(log.width);
     let white = deviation_of(contact, &log.effort)
         .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
     let (white, form) = (white * white_share(log.width), LEAST_NOISE * scales.own);
     let noise = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
-        let folded = folded * swings[i].hypot(friction_swings[i]);
-        vec![white, log.inertial_noise, form, between.0, between.1, folded]
+        vec![white, log.inertial_noise, form, between.0, between.1]
     };
     // What the derivative of a Gaussian lets through of white noise.
     let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
