@@ -8,7 +8,7 @@
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::contact::log::unwrapped;
-use super::filters::{gaussian, largest_change, rms, white_share};
+use super::filters::{gaussian, largest_change, rms, steps, white_share};
 use super::grid::Grid;
 use super::noise;
 use super::term::Parameter;
@@ -113,10 +113,8 @@ impl DriveLog {
         let contact = friction.is_some();
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
         let (angle_noise, effort_noise) = (deviation_of(contact, &position), deviation_of(contact, &effort));
-        let root_pi = std::f64::consts::PI.sqrt();
-        let inertial = |width: f64| {
-            inertia * angle_noise * (0.375 / (root_pi * width.powi(5))).sqrt() / grid.step_s.powi(2)
-        };
+        let inertial =
+            |width: f64| inertia * angle_noise * curvature_passed(width, contact) / grid.step_s.powi(2);
         let fits = |width: &f64| inertial(*width) < 0.5 * effort_noise * white_share(*width);
         let (narrowest, widest) = (if contact { WIDTHS[2] } else { WIDTHS[0] }, WIDTHS[5]);
         let (width, inertial_noise) = if inertia.is_finite() {
@@ -158,6 +156,15 @@ impl DriveLog {
     pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
         gaussian(values, self.width, 0)
     }
+}
+
+/// Share of an angle's noise that is left in its second derivative, per sample squared: white noise; beside a contact the error
+/// of a count at worst, all at the frequency that the filter passes best. A speed loop that swings by half a count repeats it.
+/// A drive alone is looked at for its ripple, which a filter that is wide enough for that would take out.
+fn curvature_passed(width: f64, contact: bool) -> f64 {
+    let white = (0.375 / (std::f64::consts::PI.sqrt() * width.powi(5))).sqrt();
+    let tonal = 2.0 / (std::f64::consts::E * width * width);
+    if contact { white.max(tonal) } else { white }
 }
 
 /// Noise of a channel. Beside a contact it is what the channel shows in its quiet stretches; a drive alone may ripple
@@ -280,12 +287,18 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let effort_change = largest_change(&log.effort, log.width);
     let friction_change =
         log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| largest_change(f, log.width));
+    // The same for what swings faster than the filter lets pass: a limit cycle's harmonics beyond half the rate fold back to
+    // where it does.
+    let swings = steps(&log.effort, log.width);
+    let friction_swings = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| steps(f, log.width));
+    let folded = BETWEEN_SAMPLES * white_share(log.width);
     let white = deviation_of(contact, &log.effort)
         .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
     let (white, form) = (white * white_share(log.width), LEAST_NOISE * scales.own);
     let noise = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
-        vec![white, log.inertial_noise, form, between.0, between.1]
+        let folded = folded * swings[i].hypot(friction_swings[i]);
+        vec![white, log.inertial_noise, form, between.0, between.1, folded]
     };
     // What the derivative of a Gaussian lets through of white noise.
     let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
@@ -293,4 +306,25 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let standstill = (STANDSTILL * scales.speed).max(STANDSTILL_NOISES * speed_noise);
     let left_out = log.speed.iter().zip(&log.usable).map(|(v, used)| v.abs() < standstill || !used).collect();
     LogRows { width: log.width, step_s: log.grid.step_s, left_out, noise: Box::new(noise) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_an_angle_that_swings_by_half_a_count_is_in_the_noise() {
+        // At 70 Hz in a log of 1 kHz: the encoder shows nothing, and all of the motion is the error.
+        let swing: Vec<f64> = (0..4000).map(|i| 0.49 * (0.44 * f64::from(i)).sin()).collect();
+        let error: Vec<f64> = swing.iter().map(|x| x.round() - x).collect();
+        let width = 4.0;
+        let left = rms(&gaussian(&error, width, 2)[100..3900]);
+        let noise = |contact| curvature_passed(width, contact) / 12.0f64.sqrt();
+        assert!(
+            left < 1.5 * noise(true) && left > 3.0 * noise(false),
+            "{left} {} {}",
+            noise(true),
+            noise(false)
+        );
+    }
 }

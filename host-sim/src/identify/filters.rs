@@ -119,6 +119,13 @@ pub fn largest_change(values: &[f64], width: f64) -> Vec<f64> {
     local_maximum(&gaussian(values, width, 1).iter().map(|d| d.abs()).collect::<Vec<_>>(), 2)
 }
 
+/// RMS of the steps from sample to sample, over a Gaussian window of this width.
+pub fn steps(values: &[f64], width: f64) -> Vec<f64> {
+    let squares: Vec<f64> =
+        (0..values.len()).map(|i| (values[i] - values[i.saturating_sub(1)]).powi(2)).collect();
+    gaussian(&squares, width, 0).iter().map(|square| square.max(0.0).sqrt()).collect()
+}
+
 /// Share of white noise that a Gaussian of this width leaves.
 pub fn white_share(width: f64) -> f64 {
     (0.5 / (std::f64::consts::PI.sqrt() * width)).sqrt()
@@ -210,6 +217,14 @@ pub fn median_magnitude(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::predict::SecondOrder;
+
+    #[test]
+    fn steps_see_what_swings_from_sample_to_sample_and_not_a_slope() {
+        let swings: Vec<f64> = (0..200).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        assert!((steps(&swings, 6.0)[100] - 2.0).abs() < 1e-6);
+        let slope: Vec<f64> = (0..200).map(|i| 0.01 * f64::from(i)).collect();
+        assert!((steps(&slope, 6.0)[100] - 0.01).abs() < 1e-6);
+    }
 
     #[test]
     fn flat_smoothing_passes_cubics_and_keeps_a_mode_that_the_gaussian_loses() {
