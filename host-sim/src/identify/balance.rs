@@ -6,6 +6,8 @@
 //!
 //! The noisy side is the response: torques carry the noise, angles little of it.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -134,6 +136,8 @@ const FIRST_TEMPER: f64 = 3.0;
 pub struct Solved {
     /// Places of its alternatives.
     pub set: Vec<usize>,
+    /// How many parameters the base has.
+    pub base: usize,
     /// Values: base, then alternative after alternative.
     pub p: Vec<f64>,
     /// Standard deviations of the values.
@@ -145,18 +149,24 @@ pub struct Solved {
 }
 
 impl Solved {
-    /// The forms of its set, each with the values of its parameters; `base` parameters stand before them.
+    /// The forms of its set, each with the places of its parameters among the values.
     pub fn forms<'s>(
         &'s self,
         alternatives: &'s [Alternative],
-        base: usize,
-    ) -> impl Iterator<Item = (&'s Alternative, &'s [f64])> {
-        self.set.iter().scan(base, |at, chosen| {
-            let form = &alternatives[*chosen];
-            let from = std::mem::replace(at, *at + form.parameters.len());
-            Some((form, &self.p[from..*at]))
-        })
+    ) -> impl Iterator<Item = (&'s Alternative, Range<usize>)> {
+        placed(self.set.iter().map(|chosen| &alternatives[*chosen]), self.base)
     }
+}
+
+/// Forms with the places of their parameters, which stand one form after the other behind those of the base.
+fn placed<'f>(
+    forms: impl Iterator<Item = &'f Alternative>,
+    base: usize,
+) -> impl Iterator<Item = (&'f Alternative, Range<usize>)> {
+    forms.scan(base, |at, form| {
+        let from = std::mem::replace(at, *at + form.parameters.len());
+        Some((form, from..*at))
+    })
 }
 
 impl Balance {
@@ -280,17 +290,16 @@ impl Balance {
             residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
         }
         let std = (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
-        Solved { set: set.to_vec(), p, std, log_evidence, residual }
+        Solved { set: set.to_vec(), base: self.base.len(), p, std, log_evidence, residual }
     }
 
     /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.
     fn waves(&self, chosen: &[&Alternative], p: &[f64], covariance: &DMatrix<f64>) -> Vec<(Vec<Seen>, f64)> {
         let mut out = Vec::new();
-        let mut at = self.base.len();
-        for alternative in chosen {
+        for (alternative, own) in placed(chosen.iter().copied(), self.base.len()) {
             for wave in &alternative.same_amplitude {
                 let seen = wave.iter().map(|places| {
-                    let [c, s] = places.map(|place| at + place);
+                    let [c, s] = places.map(|place| own.start + place);
                     let determinant = covariance[(c, c)] * covariance[(s, s)] - covariance[(c, s)].powi(2);
                     Seen {
                         amplitude: p[c].hypot(p[s]),
@@ -300,7 +309,6 @@ impl Balance {
                 let sd = wave.first().map_or(0.0, |[c, _]| alternative.parameters[*c].sd);
                 out.push((seen.collect(), sd));
             }
-            at += alternative.parameters.len();
         }
         out
     }
@@ -411,18 +419,9 @@ pub fn search(balance: &mut Balance, alternatives: &[Alternative], most: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::noise::tests::white;
 
     const ROWS: usize = 4000;
-
-    /// Deterministic noise of deviation one.
-    fn noise() -> Vec<f64> {
-        let mut state = 1u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..ROWS).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
-    }
 
     /// A balance with one base column, a slow swing, and rows whose named deviation is one.
     fn balance(response: Vec<f64>) -> Balance {
@@ -434,14 +433,14 @@ mod tests {
 
     #[test]
     fn rows_that_rest_do_not_sharpen_those_that_move() {
-        let mut quiet = noise();
+        let mut quiet = white(ROWS, 1);
         quiet.iter_mut().take(ROWS * 9 / 10).for_each(|r| *r = 0.0);
         let mut balance = balance(quiet);
         let solved = balance.solve(&[], &[]);
         balance.refit_noise(&solved);
         assert_eq!(balance.deviation, balance.first_deviation);
         // Rows with more noise than is named widen it.
-        let mut balance = self::balance(noise().iter().map(|r| 3.0 * r).collect());
+        let mut balance = self::balance(white(ROWS, 1).iter().map(|r| 3.0 * r).collect());
         let solved = balance.solve(&[], &[]);
         balance.refit_noise(&solved);
         assert!((balance.deviation[ROWS / 2] - 3.0).abs() < 0.2, "{}", balance.deviation[ROWS / 2]);

@@ -176,18 +176,15 @@ fn with_numbers(
 /// Parameters of the effects in a linear balance.
 pub fn linear_values(part: &Linear, place: usize) -> Values {
     let solved = &part.solved[place];
-    let mut at = part.balance.base.len();
     let mut out = Values::new();
-    for chosen in &solved.set {
-        let alternative = &part.alternatives[*chosen];
+    for (alternative, places) in solved.forms(&part.alternatives) {
         let entry = out.entry(alternative.effect).or_default();
-        for (i, q) in alternative.parameters.iter().enumerate() {
-            entry.insert(q.name.clone(), Value { value: solved.p[at + i], std: Some(solved.std[at + i]) });
+        for (q, i) in alternative.parameters.iter().zip(places) {
+            entry.insert(q.name.clone(), Value { value: solved.p[i], std: Some(solved.std[i]) });
         }
         for (name, value) in &alternative.constants {
             entry.insert(name.clone(), Value { value: *value, std: None });
         }
-        at += alternative.parameters.len();
     }
     out
 }

@@ -237,7 +237,7 @@ fn known_forms<'f>(
     solved: &'f Solved,
     fixed: &'f [Alternative],
 ) -> impl Iterator<Item = (&'f Alternative, Option<&'f [f64]>)> {
-    solved.forms(&part.alternatives, part.balance.base.len()).filter_map(|(own, p)| {
+    solved.forms(&part.alternatives).filter_map(|(own, places)| {
         let same = |a: &&Alternative| {
             a.effect == own.effect
                 && a.parameters.len() == own.parameters.len()
@@ -245,7 +245,7 @@ fn known_forms<'f>(
         };
         let form = fixed.iter().find(same)?;
         let one_log = form.parameters.iter().any(|p| p.name.contains("_log"));
-        Some((form, (!one_log).then_some(p)))
+        Some((form, (!one_log).then(|| &solved.p[places])))
     })
 }
 

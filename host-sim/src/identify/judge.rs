@@ -359,7 +359,8 @@ pub fn judge(
         // The motion with which the baseline leaves less is the better known one.
         let mut disc_cause = None;
         let parted = drive.as_ref().and_then(|drive| {
-            let forms = drive.solved.first()?.forms(&drive.alternatives, drive.balance.base.len());
+            let best = drive.solved.first()?;
+            let forms = best.forms(&drive.alternatives).map(|(form, places)| (form, &best.p[places]));
             following(&logs, forms, torque_error(drive))
         });
         if let Some((following, effect)) = parted {
