@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::contact::noise::slow_share;
 use super::contact::problem::{FREEDOM, SCALES, TYPICAL_SCALE, log_mean_exp};
 use super::filters::{self, local_maximum, median_magnitude};
-use super::linear::{self, dot};
+use super::linear;
 use super::same_amplitude::{Seen, log_ratio};
 use super::term::Parameter;
 
@@ -128,6 +128,10 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
+/// Steps of the reweighted least squares at most, and the square of one, in deviations of the posterior, that changes the
+/// evidence by half of it: nothing depends on less.
+const MOST_ITERATIONS: usize = 10;
+const CONVERGED: f64 = 1e-3;
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 
@@ -237,30 +241,26 @@ impl Balance {
         let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
         let mut r = y.clone();
         let mut h = DMatrix::zeros(n, n);
-        for _ in 0..10 {
-            let scaled: Vec<f64> = w.iter().map(|w| w / self.temper).collect();
-            let weighted: Vec<Vec<f64>> =
-                x.iter().map(|c| c.iter().zip(&scaled).map(|(x, w)| x * w).collect()).collect();
-            h = DMatrix::from_fn(n, n, |a, b| if b <= a { dot(&weighted[a], &x[b]) } else { 0.0 });
-            h.fill_upper_triangle_with_lower_triangle();
-            let width = |q: &Parameter| if q.amplitude { q.sd * TYPICAL_SCALE } else { q.sd };
+        let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
+        let width = |q: &Parameter| if q.amplitude { q.sd * TYPICAL_SCALE } else { q.sd };
+        for _ in 0..MOST_ITERATIONS {
+            w.iter_mut().for_each(|w| *w /= self.temper);
+            let mut g;
+            (h, g) = linear::normal_equations(&x, &w, &y);
             let mut a = h.clone();
-            let mut g = DVector::from_fn(n, |i, _| dot(&weighted[i], &y));
             for (i, q) in parameters.iter().enumerate() {
                 a[(i, i)] += 1.0 / width(q).powi(2);
                 g[i] += q.mean / width(q).powi(2);
             }
-            let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
             let next = linear::solve_bounded(&a, &g, &lower);
-            let moved = next.iter().zip(&p).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-            let size = next.iter().map(|a| a * a).sum::<f64>();
+            let step = &next - DVector::from_column_slice(&p);
             p = next.iter().copied().collect();
-            r = y.clone();
+            r.copy_from_slice(&y);
             for (c, p) in x.iter().zip(&p) {
                 r.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
             }
-            w = r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
-            if moved < 1e-10 * size {
+            w.iter_mut().zip(&r).for_each(|(w, r)| *w = (FREEDOM + 1.0) / (FREEDOM + r * r));
+            if step.dot(&(&a * &step)) < CONVERGED {
                 break;
             }
         }

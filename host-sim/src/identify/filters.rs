@@ -1,6 +1,8 @@
 //! Linear filters on an even grid that are the same for every term of a balance, so that both sides of an
 //! equation see the same one and no noise is differentiated on one side only.
 
+use super::linear::dot;
+
 /// A Gaussian is cut off after so many standard deviations: what is left out is 6e-5 of its area.
 pub(super) const REACH: f64 = 4.0;
 
@@ -76,7 +78,7 @@ fn convolved(values: &[f64], kernel: &[f64]) -> Vec<f64> {
     (0..n)
         .map(|i| {
             if i >= half && i + half < n {
-                values[i - half..=i + half].iter().zip(kernel).map(|(x, k)| x * k).sum()
+                dot(&values[i - half..=i + half], kernel)
             } else {
                 kernel
                     .iter()

@@ -15,8 +15,8 @@ use super::filters::gaussian;
 use super::linear;
 use super::term::Parameter;
 
-/// Steps within a sample: a mode of 150 Hz turns by 0.06 rad in one.
-const SUBSTEPS: usize = 16;
+/// A mode turns by less than this in a step within a sample, rad: its frequency is then right to φ²/24, 2e-4.
+const TURN_IN_A_STEP: f64 = 0.06;
 /// Pull towards the observed shaft torque, per sample.
 const PULL: f64 = 0.05;
 /// Points of the grid from which a fit starts, its iterations, and step and longest move of the logarithms.
@@ -47,9 +47,10 @@ pub struct TwoMass {
 fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let n = log.len();
     let dt = log.grid.step_s;
-    let h = dt / SUBSTEPS as f64;
     let disc = numbers.disc_share * inertia;
     let omega = std::f64::consts::TAU * numbers.mode_hz;
+    let substeps = (omega * dt / TURN_IN_A_STEP).ceil().max(1.0) as usize;
+    let h = dt / substeps as f64;
     let (k, d) = (disc * omega * omega, 2.0 * numbers.damping_ratio * disc * omega);
     let half = 0.5 * numbers.gap_rad;
     let free = vec![0.0; n];
@@ -72,8 +73,8 @@ fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]
         let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
         let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
         let (mut motor, mut sum) = (x[i - 1], 0.0);
-        for s in 0..SUBSTEPS {
-            let part = (s as f64 + 0.5) / SUBSTEPS as f64;
+        for s in 0..substeps {
+            let part = (s as f64 + 0.5) / substeps as f64;
             let speed = va + (vb - va) * part;
             motor += speed * h;
             let twist = motor - q;
@@ -90,7 +91,7 @@ fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]
             q += h * w;
             sum += torque;
         }
-        out[i] = sum / SUBSTEPS as f64;
+        out[i] = sum / substeps as f64;
         if observed[i].abs() > sure || half == 0.0 {
             let target = x[i] - observed[i] / k - observed[i].signum() * half;
             let off = target - q;

@@ -26,6 +26,8 @@ const LEAST_SHARE: f64 = 0.5;
 const LEAST_FORCE: f64 = 0.3;
 /// Softness of the limit at breakaway, relative.
 const LIMIT_WIDTH: f64 = 1e-3;
+/// A share of the blend that is less is none: a millionth of the force is a thousandth of any noise.
+const NEGLIGIBLE: f64 = 1e-6;
 /// A contact carries nothing below this share of the log's largest load.
 const LEAST_LOAD: f64 = 2e-3;
 
@@ -190,12 +192,13 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     start[0] = force[0] / k;
 
     // First the slip speeds, each the mean between two samples; then, at the samples, the law.
-    let mut state = start;
+    let mut states = vec![start; n];
     for i in 1..n {
-        let before = state[0];
+        let mut state = states[i - 1];
         block.step(&mut state, force, i);
-        let moved = drive.root_m[i] - drive.root_m[i - 1] - (state[0] - before);
+        let moved = drive.root_m[i] - drive.root_m[i - 1] - (state[0] - states[i - 1][0]);
         out.sliding[i] = moved / dt;
+        states[i] = state;
     }
     for i in 1..n {
         // Even about the sample: means before and after it, so that the law is not late by half a step.
@@ -212,13 +215,12 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let creep_noise = drive.noise.0.hypot(slip_noise);
     let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
-    let mut observed = start;
     let mut held = start;
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     out.force_n[0] = force[0];
     for i in 1..n {
-        block.step(&mut observed, force, i);
+        let observed = states[i];
         let way = drive.root_m[i] - drive.root_m[i - 1];
         let v = 0.5 * (way + drive.root_m[(i + 1).min(n - 1)] - drive.root_m[i.min(n - 2)]) / dt;
         let w = out.slip_m_s[i];
@@ -241,12 +243,12 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             * sigmoid((resisting / LEAST_FORCE - 1.0) / WIDTH);
         out.sliding[i] = slips;
 
-        let sliding = if slips > 1e-9 {
+        let sliding = if slips > NEGLIGIBLE {
             sign * (loaded * contact.curve.at(speed, per_log, log_slowest) + (per_load * load + film) * speed)
         } else {
             0.0
         };
-        if slips < 1.0 - 1e-9 {
+        if slips < 1.0 - NEGLIGIBLE {
             let moved = share * way;
             let mut sticking = k * (held[0] + moved) + c * share * v;
             for b in 0..3 {
