@@ -385,7 +385,8 @@ pub fn judge(
         let (noise, ranked, sizes, best) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, progress);
-            let sizes = found.ranked.iter().map(|r| search::sizes(&problem, &r.fit)).collect();
+            let fitted = found.ranked.iter().map(|r| &r.fit);
+            let sizes = fitted.clone().map(|fit| search::sizes(&problem, fit, fitted.clone())).collect();
             let best = &found.ranked[0].fit;
             let best = problem.change(&best.terms, &best.p);
             (problem.noise.clone(), found.ranked, sizes, best)

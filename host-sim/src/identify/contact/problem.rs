@@ -4,7 +4,9 @@
 //! (`noise.rs`), a share 1/T of the samples counted as independent. Normal priors on all parameters; those of the
 //! baseline are bounded smoothly at three deviations, so that nothing else can hide in them.
 
-use nalgebra::DMatrix;
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::change::{Change, ContactTerm};
@@ -27,6 +29,8 @@ const SLOWEST_SLIP: f64 = 0.015;
 const DRIFT: f64 = 5e-4;
 /// A sample is well known where its deviation is less than this share of the usual torque.
 const WELL_KNOWN: f64 = 0.1;
+/// Slopes are good enough where a step gains more than this share of what they promised.
+const KEPT_PROMISE: f64 = 0.5;
 /// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
 const SIMULATED_MODE: f64 = 0.25;
 
@@ -440,7 +444,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
-    /// are taken anew every other iteration: what is minimised is evaluated in each.
+    /// taken at the start, as long as steps gain what they promise: what is minimised is evaluated in each.
     pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, slopes: Option<&Slopes>) -> Fit {
         let parameters: Vec<&Parameter> = self.parameters(terms).collect();
         let n = parameters.len();
@@ -448,13 +452,11 @@ impl<'a> Problem<'a> {
         let mut r = self.residuals(terms, &p);
         let mut cost = self.cost(terms, &p, &r);
         let mut damping = 1e-3;
-        let mut own = None;
-        for iteration in 0..iterations {
-            if slopes.is_none() && iteration % 2 == 0 {
-                own = Some(self.slopes(terms, &p, &r));
-            }
-            let Some(slopes) = slopes.or(own.as_ref()) else { break };
-            let j = self.jacobian_with(slopes, terms, &p, &r);
+        let mut slopes = slopes.map(Cow::Borrowed);
+        for _ in 0..iterations {
+            let fresh = slopes.is_none();
+            let near = slopes.take().unwrap_or_else(|| Cow::Owned(self.slopes(terms, &p, &r)));
+            let j = self.jacobian_with(&near, terms, &p, &r);
             let w = self.weights(&r);
             let (mut h, mut g) = normal_equations(&j, &w, &r);
             for (i, q) in parameters.iter().enumerate() {
@@ -484,13 +486,26 @@ impl<'a> Problem<'a> {
                     break;
                 }
                 damping = (10.0 * damping).max(1e-2);
+                if !fresh {
+                    break;
+                }
             }
-            let Some((next, next_r, next_cost)) = found else { break };
+            let Some((next, next_r, next_cost)) = found else {
+                if fresh {
+                    break;
+                }
+                continue;
+            };
             let gained = cost - next_cost;
+            let step = DVector::from_fn(n, |i, _| next[i] - p[i]);
+            let promised = g.dot(&step) - 0.5 * step.dot(&(&h * &step));
             (p, r, cost) = (next, next_r, next_cost);
             damping = (0.3 * damping).max(1e-6);
+            if gained > KEPT_PROMISE * promised {
+                slopes = Some(near);
+            }
             // Half a unit of log evidence changes no decision.
-            if gained < 0.5 {
+            if gained < 0.5 && (fresh || slopes.is_some()) {
                 break;
             }
         }

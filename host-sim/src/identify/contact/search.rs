@@ -39,14 +39,20 @@ const WORTH: f64 = 0.5 * MODEL_FORM;
 const CLOSED: usize = 3;
 
 /// How much the prediction changes, relative to the signal, when each of a set's terms is taken out and the others are
-/// fitted again.
-pub fn sizes(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+/// fitted again, where that set is not among those that are.
+pub fn sizes<'f>(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    fitted: impl Iterator<Item = &'f Fit> + Clone + Sync,
+) -> Vec<f64> {
     (0..fit.terms.len())
         .into_par_iter()
         .map(|out| {
             let left = without(problem, fit, out);
-            let left = problem.fit(&left.terms, left.p, 8, None);
-            difference(problem, &fit.r, &left.r)
+            match fitted.clone().find(|known| same_set(&known.terms, &left.terms)) {
+                Some(known) => difference(problem, &fit.r, &known.r),
+                None => difference(problem, &fit.r, &problem.fit(&left.terms, left.p, 8, None).r),
+            }
         })
         .collect()
 }
@@ -82,7 +88,8 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
     let mut parents: Vec<Fit> = singles.into_iter().take(PARENTS).collect();
     for what in ["pairs of causes", "three causes at once"] {
         // A set whose parts are too small to matter has no larger one worth a search.
-        let worth = parents.first().is_some_and(|best| sizes(problem, best).iter().all(|s| *s > WORTH));
+        let worth =
+            parents.first().is_some_and(|best| sizes(problem, best, all.iter()).iter().all(|s| *s > WORTH));
         if !worth {
             break;
         }
@@ -329,14 +336,15 @@ fn table(
 }
 
 fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
-    let mut candidates: Vec<(f64, Vec<usize>, Vec<Vec<f64>>)> = Vec::new();
-    for parent in parents {
+    let slopes: Vec<Slopes> =
+        parents.iter().map(|parent| problem.slopes(&parent.terms, &parent.p, &parent.r)).collect();
+    let mut candidates: Vec<(f64, Vec<usize>, (&Slopes, Points))> = Vec::new();
+    for (parent, slopes) in parents.iter().zip(&slopes) {
         let level = problem.log_evidence(parent);
-        let slopes = problem.slopes(&parent.terms, &parent.p, &parent.r);
-        for (gain, term, starts) in table(problem, parent, &slopes, known) {
+        for (gain, term, starts) in table(problem, parent, slopes, known) {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
             let starts = starts.into_iter().map(|s| [parent.p.as_slice(), &s].concat()).collect();
-            candidates.push((level + gain, terms, starts));
+            candidates.push((level + gain, terms, (slopes, starts)));
         }
     }
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -348,13 +356,17 @@ fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) ->
         seen.push(sorted);
         new
     });
-    let starts: Vec<(Vec<usize>, Vec<f64>)> = candidates
+    let starts: Vec<(Vec<usize>, &Slopes, Vec<f64>)> = candidates
         .into_iter()
         .take(CHILDREN)
-        .flat_map(|(_, terms, starts)| starts.into_iter().map(move |s| (terms.clone(), s)))
+        .flat_map(|(_, terms, (slopes, starts))| {
+            starts.into_iter().map(move |start| (terms.clone(), slopes, start))
+        })
         .collect();
-    let first: Vec<Fit> =
-        starts.into_par_iter().map(|(terms, start)| problem.fit(&terms, start, 2, None)).collect();
+    let first: Vec<Fit> = starts
+        .into_par_iter()
+        .map(|(terms, slopes, start)| problem.fit(&terms, start, 2, Some(slopes)))
+        .collect();
     improved(problem, first, &[(6, 5)])
 }
 
