@@ -4,6 +4,8 @@
 //! over the balances, each with the best of its sets that has no other effect. So a sensor's fault that the contact could
 //! take for friction is decided by the drive, without a rule.
 
+use rayon::prelude::*;
+
 use super::balance::{self, Alternative, Balance, Solved};
 use super::contact::baseline as contact_baseline;
 use super::contact::change::{Change, ContactTerm};
@@ -28,6 +30,9 @@ const MOST_CAUSES: usize = 3;
 const LOG_PRIOR: f64 = -3.9;
 /// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
 const EVIDENCE_SHARE: f64 = 0.1;
+/// A set with so much less ln evidence than the best one is not the answer, e^−60 of it, however small the best one's causes
+/// are: their subsets stand in the table too.
+const OUT_OF_QUESTION: f64 = 60.0 / EVIDENCE_SHARE;
 /// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
 const LEFT_SHARE: f64 = 0.5;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
@@ -386,7 +391,15 @@ pub fn judge(
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, progress);
             let fitted = found.ranked.iter().map(|r| &r.fit);
-            let sizes = fitted.clone().map(|fit| search::sizes(&problem, fit, fitted.clone())).collect();
+            let best = found.ranked.first().map_or(0.0, |r| r.log_evidence);
+            let sizes = |ranked: &search::Ranked| {
+                if best - ranked.log_evidence > OUT_OF_QUESTION {
+                    search::largest_sizes(&problem, &ranked.fit)
+                } else {
+                    search::sizes(&problem, &ranked.fit, fitted.clone())
+                }
+            };
+            let sizes = found.ranked.par_iter().map(sizes).collect();
             let best = &found.ranked[0].fit;
             let best = problem.change(&best.terms, &best.p);
             (problem.noise.clone(), found.ranked, sizes, best)

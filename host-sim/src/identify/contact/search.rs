@@ -45,15 +45,21 @@ pub fn sizes<'f>(
     fit: &Fit,
     fitted: impl Iterator<Item = &'f Fit> + Clone + Sync,
 ) -> Vec<f64> {
+    changes(problem, fit, &|left| match fitted.clone().find(|known| same_set(&known.terms, &left.terms)) {
+        Some(known) => known.r.clone(),
+        None => problem.fit(&left.terms, left.p, 8, None).r,
+    })
+}
+
+/// As [`sizes`], the others as they are: more than the whole truth.
+pub fn largest_sizes(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+    changes(problem, fit, &|left| problem.residuals(&left.terms, &left.p))
+}
+
+fn changes(problem: &Problem<'_>, fit: &Fit, left: &(dyn Fn(Fit) -> Vec<f64> + Sync)) -> Vec<f64> {
     (0..fit.terms.len())
         .into_par_iter()
-        .map(|out| {
-            let left = without(problem, fit, out);
-            match fitted.clone().find(|known| same_set(&known.terms, &left.terms)) {
-                Some(known) => difference(problem, &fit.r, &known.r),
-                None => difference(problem, &fit.r, &problem.fit(&left.terms, left.p, 8, None).r),
-            }
-        })
+        .map(|out| difference(problem, &fit.r, &left(without(problem, fit, out))))
         .collect()
 }
 
@@ -101,6 +107,7 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
     progress("evidence");
     let mut ranked = rank(problem, all);
     for _ in 0..2 {
+        let refitted_to = ranked[0].fit.terms.clone();
         problem.noise.refit(problem.logs, &ranked[0].fit.r);
         let mut kept: Vec<Fit> = ranked.iter().take(FINALISTS).map(|r| r.fit.clone()).collect();
         // The baseline and the best set of each size stay in the comparison.
@@ -113,6 +120,10 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
             kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 6, None)).collect();
         ranked = rank(problem, again);
         ranked = closed(problem, ranked);
+        // The noise is that of the answer.
+        if same_set(&ranked[0].fit.terms, &refitted_to) {
+            break;
+        }
     }
     Found { ranked }
 }

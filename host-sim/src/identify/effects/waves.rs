@@ -1,7 +1,9 @@
 //! Waves over a position: which orders a residual has, and their columns.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::identify::balance::{Alternative, Balance};
@@ -69,35 +71,63 @@ pub fn joint(
     };
     let y = scaled(&|i| residual[i]);
     let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
-    let logs = if own_phase { balance.starts.len() } else { 1 };
-    let log_of = |i: usize| balance.starts.partition_point(|start| *start <= i) - 1;
-    let waves = |k: f64| -> Vec<Vec<f64>> {
-        let own = (0..logs).flat_map(|log| [false, true].map(|sine| (log, sine)));
-        own.map(|(log, sine)| {
-            scaled(&|i| match (own_phase && log_of(i) != log, sine) {
-                (true, _) => 0.0,
-                (_, true) => (k * position[i]).sin(),
-                (_, false) => (k * position[i]).cos(),
-            })
-        })
-        .collect()
+    // The rows over which a wave has one phase.
+    let stretches: Vec<Range<usize>> = if own_phase {
+        let ends = balance.starts.iter().skip(1).copied().chain([usize::MAX]);
+        let row = |point: usize| used.partition_point(|i| *i < point);
+        balance.starts.iter().zip(ends).map(|(from, end)| row(*from)..row(end)).collect()
+    } else {
+        vec![0..y.len()]
+    };
+    let wave = |k: f64| [f64::cos as fn(f64) -> f64, f64::sin].map(|of| scaled(&|i| of(k * position[i])));
+    // Columns may be nearly the same where the position dwells.
+    let ridged = |mut h: DMatrix<f64>| {
+        for i in 0..h.nrows() {
+            h[(i, i)] += 1e-6 * h[(i, i)] + f64::MIN_POSITIVE;
+        }
+        h
     };
     let mut columns: Vec<Vec<f64>> = balance.base.iter().map(|(_, column)| scaled(&|i| column[i])).collect();
     let mut found = Vec::new();
     for _ in 0..most {
+        // What a wave explains beside these columns, by Schur's complement: those are factored once for all waves.
+        let (h, g) = linear::normal_equations(&columns, &weight, &y);
+        let known = linear::factor(&ridged(h));
+        let solved = known.solve(&g);
+        let weighted: Vec<Vec<f64>> =
+            columns.iter().map(|c| c.iter().zip(&weight).map(|(x, w)| x * w).collect()).collect();
         let explained = |k: &f64| -> f64 {
-            let all: Vec<Vec<f64>> = columns.iter().cloned().chain(waves(*k)).collect();
-            let (mut h, g) = linear::normal_equations(&all, &weight, &y);
-            // Columns may be nearly the same where the position dwells.
-            for i in 0..h.nrows() {
-                h[(i, i)] += 1e-6 * h[(i, i)] + f64::MIN_POSITIVE;
+            let waves = wave(*k);
+            let count = 2 * stretches.len();
+            let mut across = DMatrix::zeros(weighted.len(), count);
+            let mut own = DMatrix::zeros(count, count);
+            let mut right = DVector::zeros(count);
+            for (at, rows) in stretches.iter().enumerate() {
+                let part = |values: &[f64]| values[rows.clone()].to_vec();
+                let pair = waves.each_ref().map(|wave| part(wave));
+                let (h, g) = linear::normal_equations(&pair, &weight[rows.clone()], &y[rows.clone()]);
+                own.view_mut((2 * at, 2 * at), (2, 2)).copy_from(&h);
+                right.rows_mut(2 * at, 2).copy_from(&g);
+                for (of, wave) in pair.iter().enumerate() {
+                    for (row, column) in weighted.iter().enumerate() {
+                        across[(row, 2 * at + of)] = linear::dot(&column[rows.clone()], wave);
+                    }
+                }
             }
-            g.dot(&linear::factor(&h).solve(&g))
+            let left = ridged(own) - across.transpose() * known.solve(&across);
+            let right = right - across.transpose() * &solved;
+            right.dot(&linear::factor(&left).solve(&right))
         };
         let free = candidates.par_iter().filter(|k| !found.contains(*k)).map(|k| (explained(k), *k));
         let Some((_, k)) = free.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
         found.push(k);
-        columns.extend(waves(k));
+        let [cosine, sine] = wave(k);
+        for rows in &stretches {
+            let only = |values: &[f64]| -> Vec<f64> {
+                values.iter().enumerate().map(|(i, x)| if rows.contains(&i) { *x } else { 0.0 }).collect()
+            };
+            columns.extend([only(&cosine), only(&sine)]);
+        }
     }
     found
 }
