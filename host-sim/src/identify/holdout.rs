@@ -109,8 +109,15 @@ pub fn errors(
     if let Some(contact) = &found.contact {
         let place = found.place(Part::Friction).unwrap_or(0);
         let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
-        let drives: Option<Vec<DriveLog>> =
-            prepared.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
+        let fit = contact.fit(place);
+        let change = contact.problem().change(&fit.terms, &fit.p);
+        let sensed = judge::without_ends(&prepared, &change);
+        let drives: Option<Vec<DriveLog>> = sensed
+            .as_ref()
+            .unwrap_or(&prepared)
+            .iter()
+            .map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2))
+            .collect();
         let following = match (&contact.disc_cause, &found.drive, &drives) {
             (Some(cause), Some(drive), Some(drives)) if found.best().effects.contains(&cause.effect) => {
                 if training {
@@ -129,7 +136,9 @@ pub fn errors(
         if let (Some(drive), Some(drives)) = (&found.drive, drives) {
             out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), training)));
         }
-        let load_logs: Option<Vec<NormalLoadLog>> = prepared.iter().map(NormalLoadLog::new).collect();
+        let sensed = judge::without_normal_end(&prepared, &change);
+        let load_logs: Option<Vec<NormalLoadLog>> =
+            sensed.as_ref().unwrap_or(&prepared).iter().map(NormalLoadLog::new).collect();
         if let (Some(normal_load), Some(load_logs)) = (&found.normal_load, load_logs) {
             let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
             out.push((

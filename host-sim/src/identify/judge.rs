@@ -404,19 +404,11 @@ pub fn judge(
             let best = problem.change(&best.terms, &best.p);
             (problem.noise.clone(), found.ranked, sizes, best)
         };
-        if let (Some(end_n), true) = (best.normal_end_n, normal_load.is_some()) {
-            // Where the normal channel shows its end, the actuator's balance has no normal force.
-            let mut seen = logs.clone();
-            // A log that is at the end most of the time has less noise than its channel.
-            let noise_n = logs.iter().map(|log| log.normal_noise_n).fold(0.0, f64::max);
-            seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n, noise_n));
+        if let (Some(seen), true) = (without_normal_end(&logs, &best), normal_load.is_some()) {
             let seen: Option<Vec<NormalLoadLog>> = seen.iter().map(NormalLoadLog::new).collect();
             normal_load = seen.map(|logs| search_normal_load(&logs, rig));
         }
-        if let (Some(ends), true) = (best.ends_nm, drive.is_some()) {
-            // Where the friction channel shows its end, the drive's balance has no friction torque.
-            let mut seen = logs.clone();
-            seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
+        if let (Some(seen), true) = (without_ends(&logs, &best), drive.is_some()) {
             drive = of_drive(&seen);
         }
         contact =
@@ -456,6 +448,24 @@ pub fn judge(
     };
     judgement.weigh_rests();
     Ok(judgement)
+}
+
+/// Where the friction channel shows an end of its range, the drive's balance has no friction torque; `None` where it does not.
+pub fn without_ends(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
+    let ends = change.ends_nm?;
+    let mut seen = logs.to_vec();
+    seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
+    Some(seen)
+}
+
+/// Where the normal channel shows its end, the actuator's balance has no normal force; `None` where it does not.
+pub fn without_normal_end(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
+    let end_n = change.normal_end_n?;
+    // A log that is at the end most of the time has less noise than its channel.
+    let noise_n = logs.iter().map(|log| log.normal_noise_n).fold(0.0, f64::max);
+    let mut seen = logs.to_vec();
+    seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n, noise_n));
+    Some(seen)
 }
 
 /// What the drive's best set leaves, as an error of the torque that moves the disc, N m.

@@ -116,10 +116,10 @@ impl White {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::identify) mod tests {
     use super::*;
 
-    pub(in super::super) fn white(count: usize, seed: u64) -> Vec<f64> {
+    pub(in crate::identify) fn white(count: usize, seed: u64) -> Vec<f64> {
         let mut noise = White::new(seed);
         (0..count).map(|_| noise.next()).collect()
     }

@@ -89,15 +89,33 @@ mod long {
         assert!(written.diagnosis.causes[0].parameters.keys().any(|name| name.starts_with("order")));
     }
 
+    /// The first seed whose case clips this channel.
+    fn first_that_clips(channel: &str) -> u64 {
+        let clips = |seed: &u64| {
+            let scenario = Scenario { duration_s: 2.0, ..Scenario::new(&[Effect::AdcSaturation], *seed) };
+            let case = generate(&scenario).unwrap();
+            serde_json::to_value(&case.truth.laws).unwrap()["adc_saturation"]["channel"] == channel
+        };
+        (101..).find(clips).unwrap()
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn a_friction_channel_that_clips_leaves_the_drive_as_it_is() {
+        let written = named(&[Effect::AdcSaturation], first_that_clips("friction"), Base::Series);
+        let friction = &written.diagnosis.subsystems["friction"];
+        assert!(friction.extended.gain.unwrap() > 0.5, "{:?}", friction.extended);
+        // Held-out rows whose friction torque is not known are no error of the drive.
+        for log in &written.diagnosis.subsystems["drive"].holdout {
+            assert!(log.baseline_nrmse < 1.5 * log.noise_floor_nrmse, "{log:?}");
+        }
+    }
+
     #[test]
     #[ignore = "long: cargo verify runs it"]
     fn a_normal_channel_that_clips_is_named_with_its_end() {
         let effects = [Effect::AdcSaturation];
-        let clips_normal = |seed: &u64| {
-            let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&effects, *seed) }).unwrap();
-            serde_json::to_value(&case.truth.laws).unwrap()["adc_saturation"]["channel"] == "normal"
-        };
-        let seed = (101..).find(clips_normal).unwrap();
+        let seed = first_that_clips("normal");
         let written = named(&effects, seed, Base::Series);
         let case = generate(&Scenario { base: Base::Series, ..Scenario::new(&effects, seed) }).unwrap();
         let log = Log::parse_csv("train", case.train[0].as_bytes()).unwrap();

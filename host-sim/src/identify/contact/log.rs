@@ -149,10 +149,16 @@ impl ContactLog {
         self.speed_noise_m_s = self.speed_noise_m_s.hypot(self.radius_m * speed_error);
     }
 
-    /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.
-    pub fn leave_out_ends(&mut self, (low, high): (f64, f64)) {
+    /// Values of the friction channel beyond which it is at an end of its range, N m.
+    pub fn near_ends(&self, (low, high): (f64, f64)) -> (f64, f64) {
         let near = END_NOISES * self.friction_noise_nm;
-        let ends = self.friction_nm.iter().map(|x| *x > high - near || *x < low + near).collect();
+        (low + near, high - near)
+    }
+
+    /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.
+    pub fn leave_out_ends(&mut self, ends: (f64, f64)) {
+        let (low, high) = self.near_ends(ends);
+        let ends = self.friction_nm.iter().map(|x| *x > high || *x < low).collect();
         self.leave_out(ends);
     }
 

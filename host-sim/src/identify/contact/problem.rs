@@ -293,14 +293,14 @@ impl<'a> Problem<'a> {
                     shifted(&behind, log.friction_late + late)
                 }
             };
-            let force_n: Vec<f64> = seen.iter().map(|t| t / log.radius_m).collect();
+            let mut force_n: Vec<f64> = seen.iter().map(|t| t / log.radius_m).collect();
             let usual = rms(&log.root_speed_m_s);
             let drive = Drive {
                 step_s,
                 interval_s: log.grid.interval_s(),
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
                 load_n: &log.load_n,
-                force_n: &force_n,
+                force_n: &[],
                 log_factor: change.log_factor.as_ref().map(|m| m[at].as_slice()),
                 slip_threshold_m_s: (SLOWEST_SLIP * usual).max(SLIP_NOISES * log.speed_noise_m_s).max(1e-9),
                 noise: (
@@ -308,7 +308,19 @@ impl<'a> Problem<'a> {
                     log.friction_noise_nm.max(1e-12) / log.radius_m,
                 ),
             };
-            let observed = observe(&contact, &drive);
+            let mut observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
+            if let Some(ends) = change.ends_nm {
+                // At an end of its range the channel says that the force is at least that: the law's own stands in for it.
+                let (low, high) = log.near_ends(ends);
+                for ((seen, force), by_law) in seen.iter().zip(&mut force_n).zip(&observed.force_n) {
+                    if *seen > high {
+                        *force = force.max(*by_law);
+                    } else if *seen < low {
+                        *force = force.min(*by_law);
+                    }
+                }
+                observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
+            }
             let mut torque: Vec<f64> = observed.force_n.iter().map(|f| f * log.radius_m).collect();
             if let Some((hz, zeta)) = ringing {
                 let mut mode = SecondOrder::new(hz, zeta, torque.first().copied().unwrap_or(0.0));

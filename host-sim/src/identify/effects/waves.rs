@@ -264,6 +264,8 @@ pub fn travel(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::balance::LogRows;
+    use crate::identify::noise::tests::white;
 
     #[test]
     fn the_orders_of_a_sum_of_waves_are_found_with_the_strongest_first() {
@@ -273,5 +275,53 @@ mod tests {
             x.iter().enumerate().map(|(i, x)| (5.0 * x).cos() + 0.4 * (12.0 * x).sin() + noise(i)).collect();
         let candidates: Vec<f64> = (1..40).map(f64::from).collect();
         assert_eq!(lines(&[x], &[r], &candidates, 4, 60.0), [5.0, 12.0]);
+    }
+
+    #[test]
+    fn waves_with_a_phase_for_each_log_are_found_beside_a_balance_that_has_one_of_them() {
+        const ROWS: usize = 1500;
+        let position: Vec<f64> = (0..2 * ROWS).map(|i| 0.01 * (i % ROWS) as f64).collect();
+        let phase = |i: usize| if i < ROWS { 0.3 } else { 2.1 };
+        let noise = white(2 * ROWS, 5);
+        // The base holds order 3 in one phase: what it takes is not told again.
+        let of_base: Vec<f64> = position.iter().map(|x| (3.0 * x).cos()).collect();
+        let residual: Vec<f64> = (0..2 * ROWS)
+            .map(|i| {
+                let x = position[i];
+                4.0 * of_base[i] + (7.0 * x + phase(i)).cos() + 0.5 * (12.0 * x).sin() + 0.3 * noise[i]
+            })
+            .collect();
+        let log = || LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; ROWS],
+            noise: Box::new(|_| vec![0.3]),
+        };
+        let base = vec![(Parameter::amplitude("base", 10.0), of_base)];
+        let balance = Balance::new(residual.clone(), base, &[log(), log()], 1.0);
+        let candidates: Vec<f64> = (1..30).map(f64::from).collect();
+        let found = |own| joint(&balance, &position, &residual, &candidates, 2, own);
+        assert_eq!(found(true), [7.0, 12.0]);
+        // In one phase, against the whole equations.
+        let explained = |k: f64| {
+            let scaled = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+                balance.used.iter().map(|i| of(*i) / balance.deviation[*i]).collect()
+            };
+            let columns = vec![
+                scaled(&|i| balance.base[0].1[i]),
+                scaled(&|i| (k * position[i]).cos()),
+                scaled(&|i| (k * position[i]).sin()),
+            ];
+            let y = scaled(&|i| residual[i]);
+            let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
+            let (h, g) = linear::normal_equations(&columns, &weight, &y);
+            g.dot(&linear::factor(&h).solve(&g))
+        };
+        let best = candidates
+            .iter()
+            .copied()
+            .filter(|k| *k > 3.5)
+            .max_by(|a, b| explained(*a).total_cmp(&explained(*b)));
+        assert_eq!(Some(found(false)[0]), best);
     }
 }
