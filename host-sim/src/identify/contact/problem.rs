@@ -29,6 +29,9 @@ const SLOWEST_SLIP: f64 = 0.015;
 const DRIFT: f64 = 5e-4;
 /// A sample is well known where its deviation is less than this share of the usual torque.
 const WELL_KNOWN: f64 = 0.1;
+/// A step that gains less −ln posterior than this moves no value by more than a seventh of its deviation; so many at most.
+const SETTLED: f64 = 0.01;
+const MOST_SETTLING: usize = 20;
 /// Slopes are good enough where a step gains more than this share of what they promised.
 const KEPT_PROMISE: f64 = 0.5;
 /// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
@@ -522,6 +525,19 @@ impl<'a> Problem<'a> {
             }
         }
         Fit { terms: terms.to_vec(), p, r, cost }
+    }
+
+    /// A fit brought to its optimum: what is stated of it is less than what decides.
+    pub fn settled(&self, mut fit: Fit) -> Fit {
+        for _ in 0..MOST_SETTLING {
+            let next = self.fit(&fit.terms, fit.p.clone(), 1, None);
+            let gained = fit.cost - next.cost;
+            fit = next;
+            if gained < SETTLED {
+                break;
+            }
+        }
+        fit
     }
 
     /// Points at which the search over a term starts, beside the values of the others.

@@ -125,6 +125,9 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
             break;
         }
     }
+    if let Some(best) = ranked.first_mut() {
+        best.fit = problem.settled(best.fit.clone());
+    }
     Found { ranked }
 }
 
@@ -250,7 +253,7 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
             starts.into_par_iter().map(|s| problem.fit(&terms, [others.p.as_slice(), &s].concat(), 8, None));
         if let Some(best) = fits.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
             // The places of the others have moved by one: the law stands last.
-            current = problem.fit(&best.terms, best.p, 8, None);
+            current = problem.settled(best);
             return as_laws(problem, &current);
         }
     }

@@ -72,13 +72,11 @@ pub fn joint(
     let y = scaled(&|i| residual[i]);
     let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
     // The rows over which a wave has one phase.
-    let stretches: Vec<Range<usize>> = if own_phase {
-        let ends = balance.starts.iter().skip(1).copied().chain([usize::MAX]);
-        let row = |point: usize| used.partition_point(|i| *i < point);
-        balance.starts.iter().zip(ends).map(|(from, end)| row(*from)..row(end)).collect()
-    } else {
-        vec![0..y.len()]
-    };
+    let starts = if own_phase { balance.starts.as_slice() } else { &[0] };
+    let ends = starts.iter().skip(1).copied().chain([usize::MAX]);
+    let row = |point: usize| used.partition_point(|i| *i < point);
+    let stretches: Vec<Range<usize>> =
+        starts.iter().zip(ends).map(|(from, end)| row(*from)..row(end)).collect();
     let wave = |k: f64| [f64::cos as fn(f64) -> f64, f64::sin].map(|of| scaled(&|i| of(k * position[i])));
     // Columns may be nearly the same where the position dwells.
     let ridged = |mut h: DMatrix<f64>| {
