@@ -9,10 +9,11 @@ use model_core::extension::Extension as CoreExtension;
 use nalgebra::DMatrix;
 
 use super::contact::baseline::has_block;
-use super::contact::problem::{Numbers, Problem};
+use super::contact::log::ContactLog;
+use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
+use super::fit_interval;
 use super::judge::{ContactPart, Judgement, Linear, Part};
-use super::linear::{self, normal_equations};
 use crate::files::model_file::{Extension, ModelFile, ModelKind};
 use crate::files::number;
 use crate::input_error::InputError;
@@ -48,7 +49,7 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
     let problem = part.problem();
     let fit = search::as_laws(&problem, part.fit(place));
     let base = part.baseline.free.len();
-    let covariance = covariance(&problem, &fit.terms, &fit.p, &fit.r);
+    let covariance = covariance(&problem, &fit);
     let mut numbers = part.baseline.numbers(&fit.p);
     let mut values = Values::new();
     let mut extensions = Vec::new();
@@ -126,13 +127,12 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
     Ok(ExtendedContact { model: extended, values })
 }
 
-fn covariance(problem: &Problem<'_>, terms: &[usize], p: &[f64], r: &[f64]) -> DMatrix<f64> {
-    let j = problem.jacobian(terms, p, r);
-    let (mut h, _) = normal_equations(&j, &problem.weights(r), r);
-    for (i, q) in problem.parameters(terms).enumerate() {
-        h[(i, i)] += 1.0 / (q.sd * q.sd);
-    }
-    linear::factor(&h).inverse()
+/// Of all fitted values, from blocks of the residuals: what strikes a few load steps is known by those few.
+fn covariance(problem: &Problem<'_>, fit: &Fit) -> DMatrix<f64> {
+    let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
+    let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
+    let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
+    fit_interval::covariance(&columns, &fit.r, &lengths, &prior_sd)
 }
 
 /// A model file with fitted numbers; `block` makes a model without one the series element.
