@@ -11,7 +11,7 @@ use super::contact::baseline as contact_baseline;
 use super::contact::change::{Change, ContactTerm};
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
-use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
+use super::contact::problem::{Baseline, EVIDENCE_SHARE, Fit, Noise, Numbers, Problem};
 use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
@@ -28,11 +28,9 @@ use crate::input_error::InputError;
 const MOST_CAUSES: usize = 3;
 /// ln of the prior probability that an effect of the library acts: one in fifty.
 const LOG_PRIOR: f64 = -3.9;
-/// Evidence counts with this share: balances are wrong in form, not only in noise, so that their evidence is too sure.
-const EVIDENCE_SHARE: f64 = 0.1;
 /// A set with so much less ln evidence than the best one is not the answer, e^−60 of it, however small the best one's causes
 /// are: their subsets stand in the table too.
-const OUT_OF_QUESTION: f64 = 60.0 / EVIDENCE_SHARE;
+const OUT_OF_QUESTION: f64 = 60.0;
 /// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
 const LEFT_SHARE: f64 = 0.5;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
@@ -69,7 +67,7 @@ impl Part {
 pub struct Candidate {
     /// Effects, in alphabetical order.
     pub effects: Vec<&'static str>,
-    /// ln evidence.
+    /// ln evidence, the likelihood with its share.
     pub log_evidence: f64,
     /// Place in the balance's own list.
     pub place: usize,
@@ -232,7 +230,7 @@ impl Linear {
             debug_assert_eq!(names(&solved.set), effects.iter().map(|e| e.0).collect::<Vec<_>>());
             out.push(Candidate {
                 effects: effects.iter().map(|e| e.0).collect(),
-                log_evidence: solved.log_evidence,
+                log_evidence: EVIDENCE_SHARE * solved.log_evidence,
                 place,
                 sizes: effects.iter().map(|e| e.1).collect(),
                 floor: MODEL_FORM
@@ -299,7 +297,7 @@ type Rests = Vec<(Part, Rest)>;
 impl Hypothesis {
     /// ln evidence over all balances, without the prior of its causes.
     pub fn log_evidence(&self) -> f64 {
-        (self.log_weight - LOG_PRIOR * self.effects.len() as f64) / EVIDENCE_SHARE
+        self.log_weight - LOG_PRIOR * self.effects.len() as f64
     }
 }
 
@@ -552,7 +550,7 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
             let mut places = Vec::new();
             for (part, candidates) in parts {
                 let best = within(candidates, &effects)?;
-                log_weight += EVIDENCE_SHARE * best.log_evidence;
+                log_weight += best.log_evidence;
                 places.push((*part, best.place));
                 for (own, (effect, size)) in best.effects.iter().zip(&best.sizes).enumerate() {
                     let at = effects.iter().position(|e| e == effect)?;

@@ -559,27 +559,33 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// ln evidence by Laplace's method, averaged over the scale of the amplitudes.
-    pub fn log_evidence(&self, fit: &Fit) -> f64 {
+    /// ln ∫ likelihood^share · prior by Laplace's method, averaged over the scale of the amplitudes: the whole evidence, and
+    /// that with [`EVIDENCE_SHARE`].
+    pub fn log_evidence(&self, fit: &Fit) -> [f64; 2] {
         let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
         let (h, _) = normal_equations(&j, &self.weights(&fit.r), &fit.r);
         let parameters: Vec<&Parameter> = self.parameters(&fit.terms).collect();
         let misfit = self.misfit(&fit.r);
         let at_bound = |i: usize| fit.p[i] <= parameters[i].lower;
         let active: Vec<usize> = (0..fit.p.len()).filter(|i| !at_bound(*i)).collect();
-        log_mean_exp(SCALES.iter().map(|scale| {
-            let sd = |i: usize| self.width(parameters[i], *scale);
-            let prior: f64 =
-                (0..fit.p.len()).map(|i| ((fit.p[i] - parameters[i].mean) / sd(i)).powi(2)).sum();
-            let scaled = DMatrix::from_fn(active.len(), active.len(), |a, b| {
-                let (a, b) = (active[a], active[b]);
-                h[(a, b)] * sd(a) * sd(b) + f64::from(u8::from(a == b))
-            });
-            -misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
-        }))
+        [1.0, EVIDENCE_SHARE].map(|share| {
+            log_mean_exp(SCALES.iter().map(|scale| {
+                let sd = |i: usize| self.width(parameters[i], *scale);
+                let prior: f64 =
+                    (0..fit.p.len()).map(|i| ((fit.p[i] - parameters[i].mean) / sd(i)).powi(2)).sum();
+                let scaled = DMatrix::from_fn(active.len(), active.len(), |a, b| {
+                    let (a, b) = (active[a], active[b]);
+                    share * h[(a, b)] * sd(a) * sd(b) + f64::from(u8::from(a == b))
+                });
+                -share * misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
+            }))
+        })
     }
 }
 
+/// The likelihood counts with this share: balances are wrong in form, not only in noise, so that it is too sure. In the contact
+/// priors count whole; in the linear balances all of the evidence has the share.
+pub const EVIDENCE_SHARE: f64 = 0.1;
 /// Scales of the amplitudes' priors: effects of 3 to 100 % are equally expected.
 pub const SCALES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
 /// The scale that the search itself uses.

@@ -16,7 +16,7 @@ use crate::identify::linear::{self, normal_equations};
 /// A hypothesis with its ln evidence.
 #[derive(Debug, Clone)]
 pub struct Ranked {
-    /// ln evidence.
+    /// ln evidence, the likelihood with its share.
     pub log_evidence: f64,
     /// The fit.
     pub fit: Fit,
@@ -354,7 +354,7 @@ fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) ->
         parents.iter().map(|parent| problem.slopes(&parent.terms, &parent.p, &parent.r)).collect();
     let mut candidates: Vec<(f64, Vec<usize>, (&Slopes, Points))> = Vec::new();
     for (parent, slopes) in parents.iter().zip(&slopes) {
-        let level = problem.log_evidence(parent);
+        let [level, _] = problem.log_evidence(parent);
         for (gain, term, starts) in table(problem, parent, slopes, known) {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
             let starts = starts.into_iter().map(|s| [parent.p.as_slice(), &s].concat()).collect();
@@ -387,7 +387,7 @@ fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) ->
 fn rank(problem: &Problem<'_>, fits: Vec<Fit>) -> Vec<Ranked> {
     let fits = unique(fits);
     let mut ranked: Vec<Ranked> =
-        fits.into_par_iter().map(|fit| Ranked { log_evidence: problem.log_evidence(&fit), fit }).collect();
+        fits.into_par_iter().map(|fit| Ranked { log_evidence: problem.log_evidence(&fit)[1], fit }).collect();
     ranked.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     ranked
 }
