@@ -365,6 +365,11 @@ impl<'a> Problem<'a> {
         base.chain(terms.iter().flat_map(|t| self.terms[*t].parameters.iter()))
     }
 
+    /// −ln of likelihood times prior at a point, but for constants.
+    pub fn cost_at(&self, terms: &[usize], p: &[f64]) -> f64 {
+        self.cost(terms, p, &self.residuals(terms, p))
+    }
+
     fn cost(&self, terms: &[usize], p: &[f64], r: &[f64]) -> f64 {
         let prior: f64 = self
             .parameters(terms)

@@ -35,6 +35,8 @@ const FINALISTS: usize = 8;
 /// A larger set is looked for where each part of the smaller one changes the prediction by this share of the signal: half
 /// of what the model's form is known to.
 const WORTH: f64 = 0.5 * MODEL_FORM;
+/// −ln posterior by which a point has to be better than a known optimum to be another valley's: what a fit leaves undone.
+const NO_WORSE: f64 = 0.5;
 /// Sets whose subsets stay in the comparison, so that what a cause adds is seen beside the same others.
 const CLOSED: usize = 3;
 
@@ -131,15 +133,17 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
     Found { ranked }
 }
 
-/// With the subsets of the best sets that are missing, each fitted from where its set stood.
+/// With the subsets of the best sets that are missing or stand in a side valley, each fitted from where its set stood.
 fn closed(problem: &Problem<'_>, mut ranked: Vec<Ranked>) -> Vec<Ranked> {
     for _ in 0..2 {
         let mut missing: Vec<Fit> = Vec::new();
         for set in ranked.iter().take(CLOSED).map(|r| &r.fit).filter(|fit| fit.terms.len() > 1) {
             for out in 0..set.terms.len() {
                 let subset = without(problem, set, out);
-                let known = ranked.iter().map(|r| &r.fit).chain(&missing);
-                if !known.into_iter().any(|fit| same_set(&fit.terms, &subset.terms)) {
+                // Or fitted, and not as well as the larger set's own point without the cause: it stood in a side valley.
+                let cost = problem.cost_at(&subset.terms, &subset.p);
+                let mut known = ranked.iter().map(|r| &r.fit).chain(&missing);
+                if !known.any(|fit| same_set(&fit.terms, &subset.terms) && fit.cost < cost + NO_WORSE) {
                     missing.push(subset);
                 }
             }
