@@ -12,7 +12,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contact::noise::slow_share;
-use super::contact::problem::{FREEDOM, SCALES, TYPICAL_SCALE, log_mean_exp};
+use super::contact::problem::FREEDOM;
+use super::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
 use super::filters::{self, local_maximum, median_magnitude};
 use super::linear;
 use super::same_amplitude::{Seen, log_ratio};
@@ -146,7 +147,7 @@ pub struct Solved {
     pub p: Vec<f64>,
     /// Standard deviations of the values.
     pub std: Vec<f64>,
-    /// ln evidence.
+    /// ln evidence, the likelihood with its share.
     pub log_evidence: f64,
     /// Residuals of all points, in the response's unit.
     pub residual: Vec<f64>,
@@ -240,17 +241,17 @@ impl Balance {
         let mut w = vec![1.0; y.len()];
         let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
         let mut r = y.clone();
-        let mut h = DMatrix::zeros(n, n);
+        let (mut h, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
-        let width = |q: &Parameter| if q.amplitude { q.sd * TYPICAL_SCALE } else { q.sd };
         for _ in 0..MOST_ITERATIONS {
             w.iter_mut().for_each(|w| *w /= self.temper);
-            let mut g;
-            (h, g) = linear::normal_equations(&x, &w, &y);
+            (h, slope) = linear::normal_equations(&x, &w, &y);
+            let mut g = slope.clone();
             let mut a = h.clone();
             for (i, q) in parameters.iter().enumerate() {
-                a[(i, i)] += 1.0 / width(q).powi(2);
-                g[i] += q.mean / width(q).powi(2);
+                let width = q.width(TYPICAL_SCALE);
+                a[(i, i)] += 1.0 / width.powi(2);
+                g[i] += q.mean / width.powi(2);
             }
             let next = linear::solve_bounded(&a, &g, &lower);
             let step = &next - DVector::from_column_slice(&p);
@@ -266,25 +267,17 @@ impl Balance {
         }
         let misfit =
             0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.temper;
-        let free: Vec<usize> = (0..n).filter(|i| p[*i] > parameters[*i].lower).collect();
         let mut posterior = h.clone();
         for (i, q) in parameters.iter().enumerate() {
             posterior[(i, i)] += 1.0 / q.sd.powi(2);
         }
         let covariance = linear::factor(&posterior).inverse();
         let waves = self.waves(&chosen, &p, &covariance);
-        let log_evidence = log_prior
-            + log_mean_exp(SCALES.iter().map(|scale| {
-                let sd = |i: usize| {
-                    if parameters[i].amplitude { parameters[i].sd * scale } else { parameters[i].sd }
-                };
-                let prior: f64 = (0..n).map(|i| ((p[i] - parameters[i].mean) / sd(i)).powi(2)).sum();
-                let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-                    h[(free[a], free[b])] * sd(free[a]) * sd(free[b]) + f64::from(u8::from(a == b))
-                });
-                let one_amplitude: f64 = waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
-                one_amplitude - misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
-            }));
+        let slope = slope - &h * DVector::from_column_slice(&p);
+        let parameters: Vec<&Parameter> = parameters.iter().collect();
+        let at = Expansion { p: &p, parameters: &parameters, misfit, slope: &slope, curvature: &h };
+        let one_amplitude = |scale: f64| waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
+        let log_evidence = log_prior + at.log_evidence(BALANCE_SHARE, one_amplitude);
         let mut residual = response;
         for (c, p) in columns.iter().zip(&p) {
             residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
@@ -303,7 +296,7 @@ impl Balance {
                     let determinant = covariance[(c, c)] * covariance[(s, s)] - covariance[(c, s)].powi(2);
                     Seen {
                         amplitude: p[c].hypot(p[s]),
-                        precision: determinant.max(f64::MIN_POSITIVE).sqrt().recip(),
+                        precision: BALANCE_SHARE * determinant.max(f64::MIN_POSITIVE).sqrt().recip(),
                     }
                 });
                 let sd = wave.first().map_or(0.0, |[c, _]| alternative.parameters[*c].sd);

@@ -11,7 +11,7 @@ use super::contact::baseline as contact_baseline;
 use super::contact::change::{Change, ContactTerm};
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
-use super::contact::problem::{Baseline, EVIDENCE_SHARE, Fit, Noise, Numbers, Problem};
+use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
@@ -230,7 +230,7 @@ impl Linear {
             debug_assert_eq!(names(&solved.set), effects.iter().map(|e| e.0).collect::<Vec<_>>());
             out.push(Candidate {
                 effects: effects.iter().map(|e| e.0).collect(),
-                log_evidence: EVIDENCE_SHARE * solved.log_evidence,
+                log_evidence: solved.log_evidence,
                 place,
                 sizes: effects.iter().map(|e| e.1).collect(),
                 floor: MODEL_FORM

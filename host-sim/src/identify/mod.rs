@@ -5,6 +5,7 @@ pub mod command;
 pub mod contact;
 pub mod drive;
 pub mod effects;
+pub mod evidence;
 pub mod extended_model;
 pub mod filters;
 pub mod fit_contact;

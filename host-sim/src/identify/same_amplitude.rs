@@ -8,7 +8,7 @@
 //!
 //! is added to the evidence. ⟨·⟩_φ is exp(−½ λ (A − a)²) e^{−λAa} I₀(λAa).
 
-use super::contact::problem::log_mean_exp;
+use super::evidence::log_mean_exp;
 
 /// What an amplitude may differ by from log to log: magnets lose 0.1 to 0.2 % per kelvin, and a motor warms by some ten.
 const REPEATS_WITHIN: f64 = 0.02;

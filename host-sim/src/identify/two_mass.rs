@@ -5,12 +5,14 @@
 //! θ_m and T_f are measured, so only the disc is integrated; a weak pull towards the torque that the motor's own balance
 //! says is in the shaft keeps it from drifting through the gap, whose crossings are too sensitive to be predicted for long.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::balance::{Alternative, DiscMotion, Solved};
 use super::contact::problem::FREEDOM;
 use super::drive::{DriveLog, INERTIA};
 use super::effects::DriveView;
+use super::evidence::{BALANCE_SHARE, log_occam};
 use super::filters::gaussian;
 use super::linear;
 use super::term::Parameter;
@@ -24,11 +26,14 @@ const STARTS: usize = 3;
 const ITERATIONS: usize = 12;
 const STEP: f64 = 0.01;
 const REACH: f64 = 0.4;
-/// ln of the prior probability of one shape: the numbers are known within a factor of some ten, and fitted within a few
-/// per cent.
-const SHAPE: f64 = -10.0;
 /// Modes that the balance's filter lets through, Hz.
 const HERTZ: [f64; 2] = [4.0, 150.0];
+/// From a steel shaft's to one beyond which nothing swings.
+const DAMPING_RATIO: [f64; 2] = [0.003, 1.5];
+/// Neither motor nor disc is all of the inertia.
+const DISC_SHARE: [f64; 2] = [0.1, 0.9];
+/// From the width of some counts of an encoder to a loose key's.
+const GAP_RAD: [f64; 2] = [1e-4, 0.3];
 
 /// Numbers of a coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,9 +118,11 @@ fn alternative(
     bearing: &[f64],
 ) -> Option<Alternative> {
     let n = numbers;
-    let allowed = (HERTZ[0]..HERTZ[1]).contains(&n.mode_hz)
-        && (0.003..1.5).contains(&n.damping_ratio)
-        && (0.1..0.9).contains(&n.disc_share);
+    let within = |[low, high]: [f64; 2], value: f64| (low..high).contains(&value);
+    let allowed = within(HERTZ, n.mode_hz)
+        && within(DAMPING_RATIO, n.damping_ratio)
+        && within(DISC_SHARE, n.disc_share)
+        && (n.gap_rad == 0.0 || within(GAP_RAD, n.gap_rad));
     if !allowed {
         return None;
     }
@@ -161,7 +168,6 @@ fn alternative(
         }),
         base_shift: vec![(INERTIA, -disc)],
         constants,
-        log_prior: SHAPE,
         ..Alternative::columns(effect, Vec::<Parameter>::new(), Vec::new())
     })
 }
@@ -190,9 +196,11 @@ pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMas
     let mut tried: Vec<Trial> = grid.par_iter().filter_map(trial).collect();
     tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
     tried.truncate(STARTS);
-    let refined = tried.into_iter().map(|start| refined(view, start, &trial));
-    let best = refined.max_by(|a, b| a.solved.log_evidence.total_cmp(&b.solved.log_evidence));
-    best.map(|best| best.alternative).into_iter().collect()
+    let refined = tried.into_iter().filter_map(|start| refined(view, start, &trial));
+    let best = refined.max_by(|(a, of_a), (b, of_b)| {
+        (a.solved.log_evidence + of_a).total_cmp(&(b.solved.log_evidence + of_b))
+    });
+    best.map(|(best, log_prior)| Alternative { log_prior, ..best.alternative }).into_iter().collect()
 }
 
 /// A coupling with what the balance makes of it.
@@ -219,13 +227,26 @@ impl TwoMass {
     }
 }
 
-/// Gauss–Newton with damping on the logarithms; the base parameters are solved for each trial (variable projection).
-fn refined(view: &DriveView<'_>, start: Trial, trial: &(dyn Fn(&TwoMass) -> Option<Trial> + Sync)) -> Trial {
+/// Occam's factor of the numbers, as a logarithm: their logarithms are equally likely between the ends, which is told by a
+/// normal prior of the same deviation.
+fn occam(curvature: &DMatrix<f64>) -> f64 {
+    let sd = [HERTZ, DAMPING_RATIO, DISC_SHARE, GAP_RAD].map(|[low, high]| (high / low).ln() / 12f64.sqrt());
+    log_occam(curvature, BALANCE_SHARE, &sd[..curvature.nrows()])
+}
+
+/// Gauss–Newton with damping on the logarithms; the base parameters are solved for each trial (variable projection). With
+/// Occam's factor of the numbers; `None` where no derivative exists.
+fn refined(
+    view: &DriveView<'_>,
+    start: Trial,
+    trial: &(dyn Fn(&TwoMass) -> Option<Trial> + Sync),
+) -> Option<(Trial, f64)> {
     let balance = view.balance;
     let scaled = |solved: &Solved| -> Vec<f64> {
         balance.used.iter().map(|&i| solved.residual[i] / balance.deviation[i]).collect()
     };
     let mut best = start;
+    let mut log_occam = None;
     let mut damping = 1e-2;
     for _ in 0..ITERATIONS {
         let p = best.numbers.logarithms();
@@ -247,6 +268,7 @@ fn refined(view: &DriveView<'_>, start: Trial, trial: &(dyn Fn(&TwoMass) -> Opti
         let weights: Vec<f64> =
             r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
         let (h, g) = linear::normal_equations(&columns, &weights, &r);
+        log_occam = Some(occam(&h));
         let mut better = None;
         for _ in 0..4 {
             let mut damped = h.clone();
@@ -267,10 +289,10 @@ fn refined(view: &DriveView<'_>, start: Trial, trial: &(dyn Fn(&TwoMass) -> Opti
         let gained = better.solved.log_evidence - best.solved.log_evidence;
         best = better;
         damping = (0.3 * damping).max(1e-4);
-        // Half a unit of log evidence changes no decision.
-        if gained < 0.5 {
+        // Half a unit of the likelihood itself changes no decision.
+        if gained < 0.5 * BALANCE_SHARE {
             break;
         }
     }
-    best
+    Some((best, log_occam?))
 }

@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::change::{Change, ContactTerm};
@@ -14,6 +14,7 @@ use super::law::{Contact, Curve};
 use super::log::{ContactLog, OBSERVED_OVER};
 pub use super::noise::Noise;
 use super::observer::{Drive, Observed, SLIP_NOISES, observe};
+use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE};
 use crate::identify::filters::{before_mode, rms, shifted, smoothed_flat};
 use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
@@ -371,16 +372,9 @@ impl<'a> Problem<'a> {
     }
 
     fn cost(&self, terms: &[usize], p: &[f64], r: &[f64]) -> f64 {
-        let prior: f64 = self
-            .parameters(terms)
-            .zip(p)
-            .map(|(q, x)| ((x - q.mean) / self.width(q, TYPICAL_SCALE)).powi(2))
-            .sum();
+        let prior: f64 =
+            self.parameters(terms).zip(p).map(|(q, x)| ((x - q.mean) / q.width(TYPICAL_SCALE)).powi(2)).sum();
         self.misfit(r) + 0.5 * prior
-    }
-
-    fn width(&self, q: &Parameter, scale: f64) -> f64 {
-        if q.amplitude { q.sd * scale } else { q.sd }
     }
 
     /// −ln likelihood, but for constants.
@@ -480,7 +474,7 @@ impl<'a> Problem<'a> {
             let w = self.weights(&r);
             let (mut h, mut g) = normal_equations(&j, &w, &r);
             for (i, q) in parameters.iter().enumerate() {
-                let sd = self.width(q, TYPICAL_SCALE);
+                let sd = q.width(TYPICAL_SCALE);
                 h[(i, i)] += 1.0 / (sd * sd);
                 g[i] -= (p[i] - q.mean) / (sd * sd);
             }
@@ -565,40 +559,18 @@ impl<'a> Problem<'a> {
     }
 
     /// ln ∫ likelihood^share · prior by Laplace's method, averaged over the scale of the amplitudes: the whole evidence, and
-    /// that with [`EVIDENCE_SHARE`].
+    /// that with [`CONTACT_SHARE`].
     pub fn log_evidence(&self, fit: &Fit) -> [f64; 2] {
         let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
-        let (h, _) = normal_equations(&j, &self.weights(&fit.r), &fit.r);
+        let (h, g) = normal_equations(&j, &self.weights(&fit.r), &fit.r);
         let parameters: Vec<&Parameter> = self.parameters(&fit.terms).collect();
-        let misfit = self.misfit(&fit.r);
-        let at_bound = |i: usize| fit.p[i] <= parameters[i].lower;
-        let active: Vec<usize> = (0..fit.p.len()).filter(|i| !at_bound(*i)).collect();
-        [1.0, EVIDENCE_SHARE].map(|share| {
-            log_mean_exp(SCALES.iter().map(|scale| {
-                let sd = |i: usize| self.width(parameters[i], *scale);
-                let prior: f64 =
-                    (0..fit.p.len()).map(|i| ((fit.p[i] - parameters[i].mean) / sd(i)).powi(2)).sum();
-                let scaled = DMatrix::from_fn(active.len(), active.len(), |a, b| {
-                    let (a, b) = (active[a], active[b]);
-                    share * h[(a, b)] * sd(a) * sd(b) + f64::from(u8::from(a == b))
-                });
-                -share * misfit - 0.5 * prior - 0.5 * linear::log_determinant(&linear::factor(&scaled))
-            }))
-        })
+        let at = Expansion {
+            p: &fit.p,
+            parameters: &parameters,
+            misfit: self.misfit(&fit.r),
+            slope: &g,
+            curvature: &h,
+        };
+        [1.0, CONTACT_SHARE].map(|share| at.log_evidence(share, |_| 0.0))
     }
-}
-
-/// The likelihood counts with this share: balances are wrong in form, not only in noise, so that it is too sure. In the contact
-/// priors count whole; in the linear balances all of the evidence has the share.
-pub const EVIDENCE_SHARE: f64 = 0.1;
-/// Scales of the amplitudes' priors: effects of 3 to 100 % are equally expected.
-pub const SCALES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
-/// The scale that the search itself uses.
-pub const TYPICAL_SCALE: f64 = 0.3;
-
-/// ln of the mean of exponentials.
-pub fn log_mean_exp(values: impl Iterator<Item = f64>) -> f64 {
-    let values: Vec<f64> = values.collect();
-    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    largest + (values.iter().map(|x| (x - largest).exp()).sum::<f64>() / values.len() as f64).ln()
 }

@@ -10,7 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::noise::MODEL_FORM;
-use super::problem::{Fit, Problem, SCALES, Slopes, log_mean_exp};
+use super::problem::{Fit, Problem, Slopes};
+use crate::identify::evidence::{SCALES, log_mean_exp};
 use crate::identify::linear::{self, normal_equations};
 
 /// A hypothesis with its ln evidence.
@@ -137,7 +138,7 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
 fn closed(problem: &Problem<'_>, mut ranked: Vec<Ranked>) -> Vec<Ranked> {
     for _ in 0..2 {
         let mut missing: Vec<Fit> = Vec::new();
-        for set in ranked.iter().take(CLOSED).map(|r| &r.fit).filter(|fit| fit.terms.len() > 1) {
+        for set in ranked.iter().take(CLOSED).map(|r| &r.fit).filter(|fit| !fit.terms.is_empty()) {
             for out in 0..set.terms.len() {
                 let subset = without(problem, set, out);
                 // Or fitted, and not as well as the larger set's own point without the cause: it stood in a side valley.
