@@ -23,16 +23,33 @@ const TOUCHING: f64 = 0.1;
 /// Load over M1's torque is a line within this share: the mechanism's friction and springs.
 const LINE_WITHIN: f64 = 0.03;
 
-/// The end at which samples pile up: more of them in the last band of values than in the next one below, thrice over.
-fn end(values: &mut [f64], noise: f64) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
+/// The end at which samples of a log pile up: more of them in the last band of values than in the next one below, thrice over.
+/// No log goes beyond it; one that rests just below it says nothing against it.
+fn end(logs: &[Vec<f64>], noise: f64) -> Option<f64> {
     let band = 2.0 * EDGE_NOISES * noise;
-    // A few samples stand above an end: spikes on the line behind what clips.
-    let top = *values.get(((1.0 - SPIKES) * n as f64) as usize)?;
-    let above = |level: f64| n - values.partition_point(|x| *x < level);
-    let (last, two) = (above(top - band), above(top - 2.0 * band));
-    (last as f64 > LEAST_SHARE * n as f64 && last > 3 * (two - last)).then(|| values[n - last / 2 - 1])
+    let piled_up = |values: &[f64]| {
+        let n = values.len();
+        let top = top(values)?;
+        let above = |level: f64| n - values.partition_point(|x| *x < level);
+        let (last, two) = (above(top - band), above(top - 2.0 * band));
+        (last as f64 > LEAST_SHARE * n as f64 && last > 3 * (two - last)).then(|| values[n - last / 2 - 1])
+    };
+    let sorted: Vec<Vec<f64>> = logs
+        .iter()
+        .map(|log| {
+            let mut values = log.clone();
+            values.sort_by(f64::total_cmp);
+            values
+        })
+        .collect();
+    let highest = sorted.iter().filter_map(|log| top(log)).fold(f64::NEG_INFINITY, f64::max);
+    let ends = sorted.iter().filter_map(|log| piled_up(log)).filter(|end| *end > highest - band);
+    ends.reduce(f64::max)
+}
+
+/// Where values end that rise, but for a few samples: spikes on the line behind what clips.
+fn top(values: &[f64]) -> Option<f64> {
+    values.get(((1.0 - SPIKES) * values.len() as f64) as usize).copied()
 }
 
 impl Effect for AdcSaturation {
@@ -52,11 +69,13 @@ impl Effect for AdcSaturation {
 impl AdcSaturation {
     /// The friction channel shows nothing beyond its ends.
     fn friction(&self, view: &ContactView<'_>) -> Option<ContactTerm> {
-        let all = |sign: f64| -> Vec<f64> { view.logs.iter().flat_map(|log| log.friction_nm.iter().map(move |x| sign * x)).collect() };
+        let of_logs = |sign: f64| -> Vec<Vec<f64>> {
+            view.logs.iter().map(|log| log.friction_nm.iter().map(|x| sign * x).collect()).collect()
+        };
         let noise = view.logs.iter().map(|log| log.friction_noise_nm).fold(1e-9, f64::max);
         let scale = view.scales.torque_nm;
         let (high, low) = if view.training {
-            (end(&mut all(1.0), noise), end(&mut all(-1.0), noise))
+            (end(&of_logs(1.0), noise), end(&of_logs(-1.0), noise))
         } else {
             (Some(scale), Some(scale))
         };
@@ -82,7 +101,7 @@ impl AdcSaturation {
         let scale = view.scales.load_n;
         let noise = view.logs.iter().map(|log| log.normal_noise_n).fold(1e-9, f64::max);
         let (high, [gain, offset]) = if view.training {
-            let high = end(&mut view.logs.iter().flat_map(|log| log.normal_n.clone()).collect::<Vec<_>>(), noise)?;
+            let high = end(&view.logs.iter().map(|log| log.normal_n.clone()).collect::<Vec<_>>(), noise)?;
             let below = |n: f64| n > TOUCHING * scale && n < high - END_NOISES * noise;
             let points = view.logs.iter().zip(&torque).flat_map(|(log, t)| log.load_n.iter().zip(t).filter(|(n, _)| below(**n)));
             let (n, t): (Vec<f64>, Vec<f64>) = points.map(|(n, t)| (n / scale, *t)).unzip();
@@ -122,4 +141,27 @@ impl AdcSaturation {
 /// A parameter that is known about a value.
 fn known(name: &str, mean: f64, sd: f64) -> Parameter {
     Parameter { amplitude: false, mean, step: 0.1 * sd, ..Parameter::amplitude(name, sd) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::noise::tests::white;
+
+    const NOISE: f64 = 0.01;
+
+    /// A swing up to a level that a channel cannot show wholly, and noise before the converter.
+    fn swing(level: f64, end: f64) -> Vec<f64> {
+        let clipped = |(i, e): (usize, &f64)| (level * (0.003 * i as f64).sin() + NOISE * e).min(end);
+        white(20_000, 4).iter().enumerate().map(clipped).collect()
+    }
+
+    #[test]
+    fn a_log_that_rests_just_below_the_end_does_not_hide_it() {
+        let rests: Vec<f64> = white(20_000, 5).iter().map(|e| 2.92 + NOISE * e).collect();
+        let found = end(&[swing(4.0, 3.0), rests.clone()], NOISE);
+        assert!(found.is_some_and(|end| (end - 3.0).abs() < 0.01), "{found:?}");
+        // A rest is no end where another log goes beyond it.
+        assert_eq!(end(&[swing(4.0, f64::INFINITY), rests], NOISE), None);
+    }
 }
