@@ -10,8 +10,12 @@ use crate::identify::term::Parameter;
 /// The effect.
 pub(super) struct EncoderEccentricity;
 
-/// An error of the angle that is large, rad: a disc set a tenth of its radius off centre.
+/// An error e of the angle that is large, rad: a disc set a tenth of its radius off centre.
 const LARGE_RAD: f64 = 0.1;
+/// A tilted disc adds a second harmonic, a fifth of the first at most. Over the measured angle, e(θ − e(θ)) ≈ e − e e′ has
+/// others too: of two harmonics m and n the product (m + n)/2 times as large at m + n.
+const LARGE_OF_HARMONIC_RAD: [f64; 4] =
+    [LARGE_RAD, 0.2 * LARGE_RAD, 1.5 * 0.2 * LARGE_RAD * LARGE_RAD, 0.04 * LARGE_RAD * LARGE_RAD];
 
 impl Effect for EncoderEccentricity {
     fn about(&self) -> About {
@@ -39,8 +43,10 @@ impl EncoderEccentricity {
         let (mut columns, mut parameters, mut angle_per_unit) = (Vec::new(), Vec::new(), Vec::new());
         for only in logs {
             let name_of_log = only.map_or(String::new(), |log| format!("_log{}", log + 1));
-            // A tilted disc adds a second harmonic, a fifth of the first at most.
-            for (name, order, sine) in [("cos", 1, false), ("sin", 1, true), ("cos", 2, false), ("sin", 2, true)] {
+            let harmonics = LARGE_OF_HARMONIC_RAD.into_iter().zip(1u8..);
+            for ((large, order), (name, sine)) in
+                harmonics.flat_map(|harmonic| [("cos", false), ("sin", true)].map(|wave| (harmonic, wave)))
+            {
                 let turns = f64::from(order);
                 let waves: Vec<Vec<f64>> = view
                     .logs
@@ -58,7 +64,6 @@ impl EncoderEccentricity {
                 });
                 columns.push(column.collect());
                 angle_per_unit.push(waves);
-                let large = if order == 1 { LARGE_RAD } else { 0.2 * LARGE_RAD };
                 parameters.push(Parameter::amplitude(format!("{name}_{order}_rad{name_of_log}"), large));
             }
         }
@@ -68,9 +73,13 @@ impl EncoderEccentricity {
             // The error is known to its own share, whatever the torque's.
             speed_per_torque: 0.0,
         };
-        // Cosine and sine of the first, then of the second harmonic, log after log.
+        // Cosine and sine of each harmonic, log after log.
+        const EACH: usize = LARGE_OF_HARMONIC_RAD.len();
         let same_amplitude = if logs.len() > 1 {
-            [0, 2].map(|harmonic| (0..logs.len()).map(|log| [4 * log + harmonic, 4 * log + harmonic + 1]).collect()).to_vec()
+            let places = |harmonic: usize| {
+                (0..logs.len()).map(move |log| [0, 1].map(|sine| 2 * (EACH * log + harmonic) + sine)).collect()
+            };
+            (0..EACH).map(places).collect()
         } else {
             Vec::new()
         };
