@@ -1,5 +1,8 @@
-//! `torque_offset`: the commanded torque has a constant offset.
+//! `torque_offset`: the commanded torque has an offset.
+//!
+//! The same in all logs, another one in each, or one that settles while the amplifier warms up.
 
+use super::coordinates::saturating;
 use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::term::Parameter;
@@ -7,11 +10,17 @@ use crate::identify::term::Parameter;
 /// The effect.
 pub(super) struct TorqueOffset;
 
+/// Times in which an amplifier settles, in shares of the longest log: soon, and hardly.
+const BENDS: [f64; 3] = [0.03, 0.1, 0.3];
+/// Names of what is not one offset.
+const OF_LOG: &str = "offset_log";
+const SETTLES: &str = "settles_by";
+
 impl Effect for TorqueOffset {
     fn about(&self) -> About {
         About {
             id: "torque_offset",
-            meaning: "the commanded torque has a constant offset",
+            meaning: "the commanded torque has an offset",
             experiment: "rest the lifted disc and find the torques at which it begins to turn either way",
         }
     }
@@ -24,19 +33,36 @@ impl Effect for TorqueOffset {
             };
             view.logs.iter().enumerate().flat_map(of).collect()
         };
-        let mut all = vec![Alternative::columns(self.id(), vec![Parameter::amplitude("offset", size)], vec![ones(None)])];
+        let offset = |name: String| Parameter::amplitude(name, size);
+        let form = |form: &str, parameters, columns| Alternative {
+            form: form.into(),
+            log_prior: -3f64.ln(),
+            ..Alternative::columns(self.id(), parameters, columns)
+        };
+        let mut all = vec![form("constant", vec![offset("offset".into())], vec![ones(None)])];
         if view.logs.len() > 1 {
-            // An amplifier's zero is another one after it has warmed up.
             let logs = 0..view.logs.len();
-            let parameters = logs.clone().map(|log| Parameter::amplitude(format!("offset_log{}", log + 1), size));
-            let columns = logs.clone().map(|log| ones(Some(log)));
-            let form = "an offset for each log".to_string();
-            all.push(Alternative { form, ..Alternative::columns(self.id(), parameters.collect(), columns.collect()) });
+            let parameters = logs.clone().map(|log| offset(format!("{OF_LOG}{}", log + 1))).collect();
+            all.push(form("another one in each log", parameters, logs.map(|log| ones(Some(log))).collect()));
         }
+        let settling = |bend: &f64| -> Vec<f64> {
+            let of = |log: &super::DriveLog| saturating(&log.grid.time_s, view.scales.time_s, *bend);
+            view.logs.iter().flat_map(of).collect()
+        };
+        let parameters = (1..=BENDS.len()).map(|n| offset(format!("{SETTLES}_{n}")));
+        all.push(form(
+            "settling",
+            std::iter::once(offset("offset".into())).chain(parameters).collect(),
+            std::iter::once(ones(None)).chain(BENDS.iter().map(settling)).collect(),
+        ));
         all
     }
 
     fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
+        // What belongs to one log or to its time is not known of another one.
+        if value(OF_LOG).or(value(SETTLES)).is_some() {
+            return None;
+        }
         let offset = value("offset")?;
         Some(DriveLaw::effort(move |_| offset))
     }
