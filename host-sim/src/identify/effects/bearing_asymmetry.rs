@@ -2,7 +2,7 @@
 //!
 //! Half the difference is even in speed: Coulomb and viscous friction, or each direction with a Stribeck curve of its own.
 
-use super::coordinates::STRIBECK_SPEEDS;
+use super::stribeck_curve::Curve;
 use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::direction;
@@ -11,8 +11,8 @@ use crate::identify::term::Parameter;
 /// The effect.
 pub(super) struct BearingAsymmetry;
 
-/// Name of the one chosen.
-const STRIBECK_SPEED: &str = "stribeck_speed";
+/// Ends of the names of what belongs to one direction.
+const WAYS: [&str; 2] = ["_forward", "_backward"];
 
 impl Effect for BearingAsymmetry {
     fn about(&self) -> About {
@@ -39,29 +39,20 @@ impl Effect for BearingAsymmetry {
             log_prior: -2f64.ln(),
             ..Alternative::columns(self.id(), parameters(), vec![coulomb.clone(), viscous.clone()])
         };
-        let with_curves = |at: f64| {
-            let fall = |of: fn(f64) -> f64| -> Vec<f64> {
-                let falling = |log: &super::DriveLog| {
-                    let fall = direction(log, s.speed).into_iter().zip(&log.speed);
-                    log.filtered(&fall.map(|(d, v)| of(d) * (-v.abs() / at).exp()).collect::<Vec<f64>>())
-                };
-                view.logs.iter().flat_map(falling).collect()
-            };
-            let each = ["static_excess_forward", "static_excess_backward"]
-                .map(|name| Parameter::positive(name, s.own));
-            Alternative {
-                form: format!("a Stribeck curve each way, below {at:.3}"),
-                constants: vec![(STRIBECK_SPEED.to_string(), at)],
-                log_prior: -(2.0 * STRIBECK_SPEEDS.len() as f64).ln(),
-                ..Alternative::columns(
-                    self.id(),
-                    parameters().into_iter().chain(each).collect(),
-                    vec![coulomb.clone(), viscous.clone(), fall(|d| d.max(0.0)), fall(|d| d.min(0.0))],
-                )
-            }
+        let curve = Curve::new(view);
+        let excesses = WAYS.into_iter().flat_map(|way| curve.parameters(way, s.own));
+        let columns = curve.columns(view, |d| d.max(0.0)).into_iter().chain(curve.columns(view, |d| d.min(0.0)));
+        let with_curves = Alternative {
+            form: "a Stribeck curve each way".into(),
+            constants: curve.constants(),
+            log_prior: -2f64.ln(),
+            ..Alternative::columns(
+                self.id(),
+                parameters().into_iter().chain(excesses).collect(),
+                [coulomb, viscous].into_iter().chain(columns).collect(),
+            )
         };
-        let curves = super::shapes(view.fixed, STRIBECK_SPEED, STRIBECK_SPEEDS.map(|share| share * s.speed).to_vec());
-        std::iter::once(plain).chain(curves.into_iter().map(with_curves)).collect()
+        vec![plain, with_curves]
     }
 
     fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
@@ -69,11 +60,10 @@ impl Effect for BearingAsymmetry {
         let (coulomb, viscous) = (part("coulomb"), part("viscous"));
         coulomb.or(viscous)?;
         let (coulomb, viscous) = (coulomb.unwrap_or(0.0), viscous.unwrap_or(0.0));
-        let excess = |way: &str| value(&format!("static_excess_{way}")).unwrap_or(0.0);
-        let (forward, backward) = (excess("forward"), excess("backward"));
-        let speed = value(STRIBECK_SPEED).unwrap_or(f64::INFINITY);
+        let [forward, backward] = WAYS.map(|way| Curve::of_file(way, value));
         Some(DriveLaw::effort(move |v: f64| {
-            let fall = if v > 0.0 { forward } else { -backward } * (-v.abs() / speed).exp();
+            let excess = |curve: &Option<Box<dyn Fn(f64) -> f64>>| curve.as_ref().map_or(0.0, |of| of(v));
+            let fall = if v > 0.0 { excess(&forward) } else { -excess(&backward) };
             coulomb + viscous * v.abs() + fall
         }))
     }

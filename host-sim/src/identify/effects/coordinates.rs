@@ -113,9 +113,6 @@ impl Coordinates {
     }
 }
 
-/// Stribeck speeds of a bearing that are tried, in shares of the usual speed.
-pub const STRIBECK_SPEEDS: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.8];
-
 /// Rises from 0 to 1 over the coordinate's largest value, the faster the smaller `bend`: straight for a large one.
 pub fn saturating(coordinate: &[f64], largest: f64, bend: f64) -> Vec<f64> {
     let end = 1.0 - (-1.0 / bend).exp();

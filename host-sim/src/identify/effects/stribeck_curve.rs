@@ -1,0 +1,93 @@
+//! A bearing's friction in excess of Coulomb's near standstill: Σ a_k exp(−(v/v_k)²), a_k ≥ 0.
+//!
+//! Mixtures of Gaussians of all widths hold exp(−|v|) and exp(−|v|^½) (Bo and Pavelescu 1982), 1/(1 + v²) (Hess and Soom
+//! 1990) and the Gaussian itself: every curve that falls, and no other. One law of them would leave the others' difference to
+//! a second cause.
+
+use super::{DriveLog, DriveView};
+use crate::identify::drive::direction;
+use crate::identify::term::Parameter;
+
+/// Widths, in shares of the usual speed: from standstill to all of it, a factor of two apart.
+const SHARES: [f64; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
+/// What the names of a width and of its excess begin with.
+const SPEED: &str = "stribeck_speed";
+const EXCESS: &str = "static_excess";
+
+/// Widths of a curve.
+pub(super) struct Curve {
+    speeds: Vec<f64>,
+}
+
+impl Curve {
+    /// By the usual speed, or as found on other logs.
+    pub(super) fn new(view: &DriveView<'_>) -> Self {
+        let known = |k: usize| {
+            let fixed = view.fixed?.iter().find(|(name, _)| *name == format!("{SPEED}_{}", k + 1))?;
+            Some(fixed.1)
+        };
+        let speed = |(k, share)| known(k).unwrap_or(share * view.scales.speed);
+        Self { speeds: SHARES.into_iter().enumerate().map(speed).collect() }
+    }
+
+    /// Names and values of the widths.
+    pub(super) fn constants(&self) -> Vec<(String, f64)> {
+        (1..).zip(&self.speeds).map(|(k, speed)| (format!("{SPEED}_{k}"), *speed)).collect()
+    }
+
+    /// The excesses; `way` tells those of one direction.
+    pub(super) fn parameters(&self, way: &str, large: f64) -> Vec<Parameter> {
+        (1..=self.speeds.len()).map(|k| Parameter::positive(format!("{EXCESS}{way}_{k}"), large)).collect()
+    }
+
+    /// Columns of the balance; `acts` is what an excess does at a direction.
+    pub(super) fn columns(&self, view: &DriveView<'_>, acts: fn(f64) -> f64) -> Vec<Vec<f64>> {
+        let column = |speed: &f64| -> Vec<f64> {
+            let of = |log: &DriveLog| {
+                let moving = direction(log, view.scales.speed).into_iter().zip(&log.speed);
+                let torque = moving.map(|(d, v)| acts(d) * (-(v / speed).powi(2)).exp());
+                log.filtered(&torque.collect::<Vec<f64>>())
+            };
+            view.logs.iter().flat_map(of).collect()
+        };
+        self.speeds.iter().map(column).collect()
+    }
+
+    /// The excess over speed by a file's values; `None` where it has none.
+    pub(super) fn of_file(way: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<Box<dyn Fn(f64) -> f64>> {
+        let pair = |k: usize| Some((value(&format!("{EXCESS}{way}_{k}"))?, value(&format!("{SPEED}_{k}"))?));
+        let parts: Vec<(f64, f64)> = (1..=SHARES.len()).map_while(pair).collect();
+        if parts.is_empty() {
+            return None;
+        }
+        Some(Box::new(move |v| parts.iter().map(|(a, speed)| a * (-(v / speed).powi(2)).exp()).sum()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::identify::law_form::LAW_FORM;
+    use crate::identify::linear::non_negative;
+
+    #[test]
+    fn published_curves_are_sums_of_the_widths() {
+        let laws: [fn(f64) -> f64; 4] =
+            [|x| (-x).exp(), |x| (-x * x).exp(), |x| 1.0 / (1.0 + x * x), |x| (-x.sqrt()).exp()];
+        let speeds: Vec<f64> = (1..200).map(|i| 0.01 * f64::from(i)).collect();
+        // Falling over a tenth to a half of the usual speed; beside Coulomb's and viscous friction.
+        for (law, at) in laws.iter().flat_map(|law| [0.1, 0.23, 0.5].map(|at| (law, at))) {
+            let base = |v: &f64| [1.0, -1.0, *v, -*v];
+            let widths = |v: &f64| SHARES.map(|share| (-(v / share).powi(2)).exp());
+            let rows: Vec<f64> = speeds.iter().flat_map(|v| base(v).into_iter().chain(widths(v))).collect();
+            let a = DMatrix::from_row_slice(speeds.len(), 4 + SHARES.len(), &rows);
+            let b = DVector::from_iterator(speeds.len(), speeds.iter().map(|v| law(v / at)));
+            let x = non_negative(&(a.transpose() * &a), &(a.transpose() * &b));
+            let left = (&a * x - &b).norm() / b.norm();
+            // One law of them leaves so much of another.
+            assert!(left < LAW_FORM, "{left} at {at}");
+        }
+    }
+}
