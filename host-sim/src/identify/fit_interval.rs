@@ -59,6 +59,26 @@ pub(super) fn covariance(
     DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * prior_sd[i] * prior_sd[j])
 }
 
+/// Samples that count as one to what is fitted: tr(V₀⁻¹V)/n, V the variance of the score from blocks and V₀ that of samples
+/// that are independent (Pauli, Racugno and Ventura 2011 scale a composite likelihood so). An error that repeats itself, as
+/// that of a swing between two samples does, has no slow part and yet says the same again and again.
+pub(super) fn repeated(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> f64 {
+    let n = columns.len();
+    let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
+    let scaled: Vec<Vec<f64>> =
+        columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
+    let squares: Vec<f64> = score.iter().map(|s| s * s).collect();
+    let (independent, _) = linear::normal_equations(&scaled, &squares, r);
+    let blocks = blocks(lengths);
+    let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
+    let factor = linear::factor(&independent);
+    let sum = |block: std::ops::Range<usize>| -> f64 {
+        let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
+        sum.dot(&factor.solve(&sum))
+    };
+    freedom * blocks.into_iter().map(sum).sum::<f64>() / n.max(1) as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +97,24 @@ mod tests {
         assert_eq!(blocks.len(), BLOCKS);
         assert!(blocks.windows(2).all(|b| b[0].end == b[1].start) && blocks[BLOCKS - 1].end == 4000);
         assert!(blocks.iter().any(|b| b.end == 3000));
+    }
+
+    #[test]
+    fn an_error_that_repeats_itself_counts_as_few_samples() {
+        let n = 8000;
+        let lengths = [n];
+        let swing: Vec<f64> = (0..n).map(|i| (2.2 * i as f64).sin()).collect();
+        let of = |r: &[f64]| repeated(std::slice::from_ref(&swing), r, &lengths, &[1.0]);
+        let white = noise(n, 5);
+        // Forty blocks know a variance within 22 %, one deviation.
+        let independent = of(&white);
+        assert!((0.4..1.8).contains(&independent), "{independent}");
+        // The form of the swing is wrong by as much as the noise, over a half of the log one way and the other way after it.
+        let wrong: Vec<f64> =
+            (0..n).map(|i| white[i] + if i < n / 2 { swing[i] } else { -swing[i] }).collect();
+        let slow = super::super::contact::noise::slow_share(&wrong, 1e-3);
+        let counts = of(&wrong);
+        assert!(slow < 2.0 && counts > 20.0, "{slow} {counts}");
     }
 
     #[test]

@@ -56,7 +56,11 @@ pub struct Noise {
     /// Deviations before anything is fitted, the form of the model left out.
     named: Vec<f64>,
     /// Samples that count as one: the spectral density of the residuals below 30 Hz over their variance.
-    pub temper: f64,
+    temper: f64,
+    /// The same, times `temper`, of samples whose error is that of what swings between them: it repeats itself in each swing.
+    repeated: f64,
+    /// Which samples these are: the sensor's own noise is less than half of their variance.
+    swinging: Vec<bool>,
     /// The sensor's factor a, as fitted.
     pub sensor_factor: f64,
 }
@@ -115,7 +119,14 @@ impl Noise {
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         let certainties = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
         let known = certainties.map(|c| *c > LEAST_CERTAINTY).collect();
-        let mut noise = Self { sources, known, temper: 3.0 / density, sensor_factor: 1.0, ..Self::default() };
+        let mut noise = Self {
+            sources,
+            known,
+            temper: 3.0 / density,
+            repeated: 1.0,
+            sensor_factor: 1.0,
+            ..Self::default()
+        };
         let mut factors = [1.0; SOURCES];
         factors[MODEL_FORM_SOURCE] = 0.0;
         noise.weigh(logs, &factors);
@@ -149,6 +160,24 @@ impl Noise {
             self.filters.push((filter, log.len()));
         }
         self.deviation = variance.into_iter().map(f64::sqrt).collect();
+    }
+
+    /// How much of an independent sample each one counts as.
+    pub fn counts(&self) -> impl Iterator<Item = f64> {
+        let [steady, swinging] = [1.0, self.repeated].map(|repeated| 1.0 / (self.temper * repeated));
+        // Before anything is fitted all are alike.
+        let each = self.swinging.iter().copied().chain(std::iter::repeat(false));
+        each.map(move |swings| if swings { swinging } else { steady })
+    }
+
+    /// Samples that swing, whose scores tell how many of them count as one.
+    pub fn swinging(&self) -> &[bool] {
+        &self.swinging
+    }
+
+    /// Takes how many of the samples that swing count as one.
+    pub fn set_repeated(&mut self, samples: f64) {
+        self.repeated = (samples / self.temper).max(1.0);
     }
 
     /// Measured less predicted, without what the channel was seen to swing with; all logs on end, N m.
@@ -225,6 +254,13 @@ impl Noise {
         }
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         self.temper = (shares.iter().sum::<f64>() / shares.len().max(1) as f64).max(1.0 / density);
+        self.repeated = 1.0;
+        self.swinging = self
+            .sources
+            .iter()
+            .zip(&self.deviation)
+            .map(|(n, deviation)| factors[0] * n[0] < 0.5 * deviation * deviation)
+            .collect();
     }
 }
 

@@ -379,7 +379,8 @@ impl<'a> Problem<'a> {
 
     /// −ln likelihood, but for constants.
     pub fn misfit(&self, r: &[f64]) -> f64 {
-        0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.noise.temper
+        let each = r.iter().zip(self.noise.counts()).map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p());
+        0.5 * (FREEDOM + 1.0) * each.sum::<f64>()
     }
 
     /// −∂r/∂p at a point, a column for each parameter.
@@ -454,7 +455,8 @@ impl<'a> Problem<'a> {
 
     /// Weights of iterated least squares.
     pub fn weights(&self, r: &[f64]) -> Vec<f64> {
-        r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / self.noise.temper).collect()
+        let each = r.iter().zip(self.noise.counts());
+        each.map(|(r, counts)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect()
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or

@@ -9,9 +9,11 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::log::ContactLog;
 use super::noise::MODEL_FORM;
 use super::problem::{Fit, Problem, Slopes};
 use crate::identify::evidence::{SCALES, log_mean_exp};
+use crate::identify::fit_interval;
 use crate::identify::linear::{self, normal_equations};
 
 /// A hypothesis with its ln evidence.
@@ -112,6 +114,11 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
     for _ in 0..2 {
         let refitted_to = ranked[0].fit.terms.clone();
         problem.noise.refit(problem.logs, &ranked[0].fit.r);
+        // What repeats itself is told from what no cause explains by the set that explains most.
+        if let Some(fullest) = ranked.iter().map(|r| &r.fit).min_by(|a, b| a.cost.total_cmp(&b.cost)) {
+            let samples = repeated(problem, fullest);
+            problem.noise.set_repeated(samples);
+        }
         let mut kept: Vec<Fit> = ranked.iter().take(FINALISTS).map(|r| r.fit.clone()).collect();
         // The baseline and the best set of each size stay in the comparison.
         for size in 0..=3 {
@@ -132,6 +139,17 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
         best.fit = problem.settled(best.fit.clone());
     }
     Found { ranked }
+}
+
+/// How many of the samples that swing count as one to what is fitted.
+fn repeated(problem: &Problem<'_>, fit: &Fit) -> f64 {
+    let mut r = problem.residuals(&fit.terms, &fit.p);
+    let columns = problem.jacobian(&fit.terms, &fit.p, &r);
+    // Samples without a residual say nothing.
+    r.iter_mut().zip(problem.noise.swinging()).for_each(|(r, swings)| *r *= f64::from(u8::from(*swings)));
+    let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
+    let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
+    fit_interval::repeated(&columns, &r, &lengths, &prior_sd)
 }
 
 /// With the subsets of the best sets that are missing or stand in a side valley, each fitted from where its set stood.
