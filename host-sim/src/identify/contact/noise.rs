@@ -56,7 +56,7 @@ pub struct Noise {
     /// Deviations before anything is fitted, the form of the model left out.
     named: Vec<f64>,
     /// Samples that count as one: the spectral density of the residuals below 30 Hz over their variance.
-    temper: f64,
+    pub temper: f64,
     /// The same, times `temper`, of samples whose error is that of what swings between them: it repeats itself in each swing.
     repeated: f64,
     /// Which samples these are: the sensor's own noise is less than half of their variance.
@@ -162,7 +162,8 @@ impl Noise {
         self.deviation = variance.into_iter().map(f64::sqrt).collect();
     }
 
-    /// How much of an independent sample each one counts as.
+    /// How much of an independent sample each one counts as in the evidence. The fit itself takes all of them alike: what swings
+    /// is what tells of a block.
     pub fn counts(&self) -> impl Iterator<Item = f64> {
         let [steady, swinging] = [1.0, self.repeated].map(|repeated| 1.0 / (self.temper * repeated));
         // Before anything is fitted all are alike.

@@ -379,8 +379,7 @@ impl<'a> Problem<'a> {
 
     /// −ln likelihood, but for constants.
     pub fn misfit(&self, r: &[f64]) -> f64 {
-        let each = r.iter().zip(self.noise.counts()).map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p());
-        0.5 * (FREEDOM + 1.0) * each.sum::<f64>()
+        0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.noise.temper
     }
 
     /// −∂r/∂p at a point, a column for each parameter.
@@ -455,8 +454,7 @@ impl<'a> Problem<'a> {
 
     /// Weights of iterated least squares.
     pub fn weights(&self, r: &[f64]) -> Vec<f64> {
-        let each = r.iter().zip(self.noise.counts());
-        each.map(|(r, counts)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect()
+        r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / self.noise.temper).collect()
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
@@ -564,12 +562,16 @@ impl<'a> Problem<'a> {
     /// that with [`CONTACT_SHARE`].
     pub fn log_evidence(&self, fit: &Fit) -> [f64; 2] {
         let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
-        let (h, g) = normal_equations(&j, &self.weights(&fit.r), &fit.r);
+        let each = || fit.r.iter().zip(self.noise.counts());
+        let weights: Vec<f64> =
+            each().map(|(r, counts)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
+        let (h, g) = normal_equations(&j, &weights, &fit.r);
         let parameters: Vec<&Parameter> = self.parameters(&fit.terms).collect();
+        let misfit: f64 = each().map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p()).sum();
         let at = Expansion {
             p: &fit.p,
             parameters: &parameters,
-            misfit: self.misfit(&fit.r),
+            misfit: 0.5 * (FREEDOM + 1.0) * misfit,
             slope: &g,
             curvature: &h,
         };
