@@ -89,20 +89,23 @@ mod long {
         assert!(written.diagnosis.causes[0].parameters.keys().any(|name| name.starts_with("order")));
     }
 
-    /// The first seed whose case clips this channel.
-    fn first_that_clips(channel: &str) -> u64 {
-        let clips = |seed: &u64| {
-            let scenario = Scenario { duration_s: 2.0, ..Scenario::new(&[Effect::AdcSaturation], *seed) };
-            let case = generate(&scenario).unwrap();
-            serde_json::to_value(&case.truth.laws).unwrap()["adc_saturation"]["channel"] == channel
+    /// The first seed for which this entry of the effect's drawn law has this value.
+    fn first_with(effect: Effect, entry: &str, value: &str) -> u64 {
+        let has = |seed: &u64| {
+            let case = generate(&Scenario { duration_s: 2.0, ..Scenario::new(&[effect], *seed) }).unwrap();
+            serde_json::to_value(&case.truth.laws).unwrap()[effect.id()][entry] == value
         };
-        (101..).find(clips).unwrap()
+        (101..).find(has).unwrap()
     }
 
     #[test]
     #[ignore = "long: cargo verify runs it"]
     fn a_friction_channel_that_clips_leaves_the_drive_as_it_is() {
-        let written = named(&[Effect::AdcSaturation], first_that_clips("friction"), Base::Series);
+        let written = named(
+            &[Effect::AdcSaturation],
+            first_with(Effect::AdcSaturation, "channel", "friction"),
+            Base::Series,
+        );
         let friction = &written.diagnosis.subsystems["friction"];
         assert!(friction.extended.gain.unwrap() > 0.5, "{:?}", friction.extended);
         // Held-out rows whose friction torque is not known are no error of the drive.
@@ -115,7 +118,7 @@ mod long {
     #[ignore = "long: cargo verify runs it"]
     fn a_normal_channel_that_clips_is_named_with_its_end() {
         let effects = [Effect::AdcSaturation];
-        let seed = first_that_clips("normal");
+        let seed = first_with(Effect::AdcSaturation, "channel", "normal");
         let written = named(&effects, seed, Base::Series);
         let case = generate(&Scenario { base: Base::Series, ..Scenario::new(&effects, seed) }).unwrap();
         let log = Log::parse_csv("train", case.train[0].as_bytes()).unwrap();
@@ -132,5 +135,11 @@ mod long {
     #[ignore = "long: cargo verify runs it"]
     fn springs_that_harden_are_named() {
         named(&[Effect::FoilHardening], 101, Base::Lugre);
+    }
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn a_second_leaf_is_no_ripple() {
+        named(&[Effect::FoilHardening], first_with(Effect::FoilHardening, "law", "stop"), Base::Series);
     }
 }

@@ -277,3 +277,21 @@ pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
     }
     if all > 0.0 && count > 0 { sum / f64::from(count) / all } else { 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_swing_count_as_the_few_that_their_scores_tell() {
+        let mut noise =
+            Noise { temper: 2.0, repeated: 1.0, swinging: vec![false, true, false], ..Noise::default() };
+        let counts = |noise: &Noise| noise.counts().take(4).collect::<Vec<f64>>();
+        assert_eq!(counts(&noise), [0.5, 0.5, 0.5, 0.5]);
+        noise.set_repeated(40.0);
+        assert_eq!(counts(&noise), [0.5, 1.0 / 40.0, 0.5, 0.5]);
+        // None counts as more than one that does not swing.
+        noise.set_repeated(1.0);
+        assert_eq!(counts(&noise), [0.5, 0.5, 0.5, 0.5]);
+    }
+}
