@@ -14,9 +14,9 @@
 //! Stream 6 fills a ring, so its counter counts periods by itself: the tick learns how many have begun since the tick
 //! before, whatever was masked meanwhile.
 //!
-//! **Filter.** Eight samples at half of the timers' 240 MHz: a level counts when it has stood for 67 ns (RM0433 39.4.7,
-//! `ICxF` = 0101). At 4.8 million counts/s (10 rev/s) each line has an edge every 417 ns and the two lines' edges are
-//! 208 ns apart, 104 ns with a phase error of 45°, so that the signal itself passes.
+//! **Filter.** Eight samples at half of the timers' 240 MHz: a level counts when it has stood for 67 ns (RM0433,
+//! `TIMx_CCMR1`, `ICxF` = 0101). At 4.8 million counts/s (10 rev/s) each line has an edge every 417 ns and the two
+//! lines' edges are 208 ns apart, 104 ns with a phase error of 45°, so that the signal itself passes.
 
 use crate::memory::{M1_LATCH, M2_LATCH, M2_LATCHES};
 use core::sync::atomic::Ordering::Relaxed;

@@ -17,7 +17,7 @@ use model_core::control::DAC_ZERO;
 /// Starts the DAC at zero torque. The enables are low already (`board::configure`).
 pub fn start() {
     rcc::enable_and_reset::<peripherals::DAC1>();
-    // Only while a channel is off (RM0433 26.7.16).
+    // Only while a channel is off (RM0433, `DAC_MCR`).
     DAC1.mcr().modify(|w| {
         w.set_mode(0, Mode::NORMAL_EXT_BUFDIS);
         w.set_mode(1, Mode::NORMAL_EXT_BUFDIS);

@@ -7,7 +7,7 @@
 //! | With `TENx` set it waits for the trigger `TSELx` names; the software trigger clears itself | 26.4.4, 26.7.2 |
 //! | `ENx` switches the analog half only: `DORx` follows the holding register with `ENx` clear too | 26.4.2 |
 //! | `DORx` is read-only; `SWTRGR` is write-only | 26.7 |
-//! | `MODEx` is written only while `ENx` and `CENx` are clear, else the write is ignored; modes 011 and 111 leave the pin alone | 26.7.16 |
+//! | `MODEx` is written only while `ENx` and `CENx` are clear, else the write is ignored; modes 011 and 111 leave the pin alone | `DAC_MCR` |
 //! | `CENx` is written only while `ENx` is clear | 26.7.1 |
 //!
 //! Left out, and told to the run when the firmware asks for it: hardware triggers, the wave generators, DMA

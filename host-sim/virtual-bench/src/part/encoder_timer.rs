@@ -1,16 +1,16 @@
 //! A general-purpose timer in encoder mode whose two inputs are fed from a queue of edges.
 //!
-//! The counting is the emulator's (RM0433 section 39.3.18); here is only what comes down the wires. The plant
-//! knows the edges of the coming control period; they are applied, in order, before the firmware's next
-//! access to the timer, and before each of the timer's own events. Between two accesses nothing can tell
-//! an edge from its instant, as no capture, trigger or interrupt hangs on these inputs.
+//! The counting is the emulator's (RM0433 chapter 39, "Encoder interface mode"); here is only what comes down the
+//! wires. The plant knows the edges of the coming control period; they are applied, in order, before the firmware's
+//! next access to the timer, and before each of the timer's own events. Between two accesses nothing can tell an edge
+//! from its instant, as no capture, trigger or interrupt hangs on these inputs.
 //!
 //! A line can be stuck: its level stays, and the encoder behind it turns on. Both lines can be swapped. A disturbance can
 //! be coupled into both: pulses that are not the encoder's.
 //!
-//! The input filter (`ICxF`, RM0433 section 39.4.7) is modelled here and kept from the emulator's timer, which would see
-//! all edges since the last access at one instant: a level counts once it has stood for N samples, so pulses shorter
-//! than that never arrive, and all edges come that much later.
+//! The input filter (`ICxF`, RM0433 chapter 39, `TIMx_CCMR1`) is modelled here and kept from the emulator's timer,
+//! which would see all edges since the last access at one instant: a level counts once it has stood for N samples, so
+//! pulses shorter than that never arrive, and all edges come that much later.
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::soc::RegisterSpec;
@@ -90,7 +90,7 @@ const FILTERS: u64 = 0xF << 4 | 0xF << 12;
 /// Clock of the filter, `fDTS` with `CKD` 00: that of the timers.
 const FILTER_HZ: u64 = 240_000_000;
 
-/// Time a level must stand with `ICxF`, in ns rounded up: (divider of `fDTS`, samples), RM0433 section 39.4.7.
+/// Time a level must stand with `ICxF`, in ns rounded up: (divider of `fDTS`, samples), RM0433 chapter 39, `TIMx_CCMR1`.
 const fn filter_ns(field: u64) -> u64 {
     const SETTINGS: [(u64, u64); 16] = [
         (1, 0),

@@ -30,7 +30,7 @@ pub(crate) struct Bench {
 impl Bench {
     pub(crate) fn new() -> Self {
         let mut bench = Self { part: Part::new().unwrap(), now: VirtualNanos(0), lines: Default::default() };
-        // DAC12EN, TIM6EN, TIM4EN, TIM2EN; ADC12EN (RM0433 sections 8.7.43 and 8.7.40).
+        // DAC12EN, TIM6EN, TIM4EN, TIM2EN; ADC12EN (RM0433, `RCC_APB1LENR` and `RCC_AHB1ENR`).
         bench.write(RCC.base + 0xE8, 1 << 29 | 1 << 4 | 1 << 2 | 1 << 0);
         bench.write(RCC.base + 0xD8, 1 << 5);
         bench

@@ -1,6 +1,6 @@
 //! TIM6 as the source of the converter's trigger: the wire `tim6_trgo` of RM0433, ADC external triggers.
 //!
-//! The emulator's timer counts the pulses of its trigger output, which `MMS` selects (RM0433 section 42.4.2);
+//! The emulator's timer counts the pulses of its trigger output, which `MMS` selects (RM0433 chapter 42, `TIMx_CR2`);
 //! each new one is passed on to ADC1. Left out: the listeners other than ADC1.
 //!
 //! The core's writes are posted: a store to this timer is done for the core long before it lands, as it crosses from the
