@@ -36,6 +36,11 @@ impl SecondOrder {
         }
     }
 
+    /// What value and rate become within a time where the input is 0, row by row.
+    pub fn transition(natural_hz: f64, damping_ratio: f64, time_s: f64) -> [f64; 4] {
+        exponential(TAU * natural_hz, damping_ratio, time_s)
+    }
+
     /// The output now.
     pub fn value(&self) -> f64 {
         self.value

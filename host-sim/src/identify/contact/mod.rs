@@ -10,3 +10,4 @@ pub mod observer;
 pub mod problem;
 mod ringing;
 pub mod search;
+mod struck_mode;

@@ -36,6 +36,8 @@ const SOURCES: usize = 8;
 const MODEL_FORM_SOURCE: usize = 4;
 /// Place of the root's motion through the stiffness.
 const ROOT_MOTION_SOURCE: usize = 6;
+/// Sources that are errors of the force before its sensor: load between samples, form of the model, slip speed, root's motion.
+const OF_FORCE: std::ops::Range<usize> = 3..7;
 /// Least certainty of a sample that takes part: the way's noise is up to three quarters of the variance.
 const LEAST_CERTAINTY: f64 = 0.5;
 /// Frequency below which effects live, Hz; above it residuals only tell how white they are.
@@ -53,6 +55,9 @@ pub struct Noise {
     sources: Vec<[f64; SOURCES]>,
     /// The filter of what swings in each log with the present deviations, and the log's length.
     filters: Vec<(Option<Filter>, usize)>,
+    /// Variance of what is uncertain of the force itself, which strikes the sensor's mode: that of the named sources, since one
+    /// taken from residuals would grow with what nothing explains.
+    pub(super) of_force: Vec<f64>,
     /// Deviations before anything is fitted, the form of the model left out.
     named: Vec<f64>,
     /// Samples that count as one: the spectral density of the residuals below 30 Hz over their variance.
@@ -117,10 +122,12 @@ impl Noise {
             }
         }
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
+        let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
         let certainties = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
         let known = certainties.map(|c| *c > LEAST_CERTAINTY).collect();
         let mut noise = Self {
             sources,
+            of_force,
             known,
             temper: 3.0 / density,
             repeated: 1.0,

@@ -14,6 +14,7 @@ use super::law::{Contact, Curve};
 use super::log::{ContactLog, OBSERVED_OVER};
 pub use super::noise::Noise;
 use super::observer::{Drive, Observed, SLIP_NOISES, observe};
+use super::struck_mode::innovations;
 use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE};
 use crate::identify::filters::{before_mode, rms, shifted, smoothed_flat};
 use crate::identify::linear::{self, normal_equations};
@@ -165,6 +166,8 @@ pub struct Prediction {
     pub shown_nm: Vec<f64>,
     /// What the law made of each log.
     pub observed: Vec<Observed>,
+    /// The sensor's mode (Hz, damping ratio) where it rings from sample to sample.
+    pub ringing: Option<(f64, f64)>,
 }
 
 /// A fitted hypothesis.
@@ -340,7 +343,8 @@ impl<'a> Problem<'a> {
             shown_nm.extend(torque);
             all.push(observed);
         }
-        Prediction { shown_nm, observed: all }
+        let ringing = change.mode.filter(|(hz, _)| self.logs.iter().all(|log| rings(*hz, log.grid.step_s)));
+        Prediction { shown_nm, observed: all, ringing }
     }
 
     /// Residuals over their deviations.
@@ -352,12 +356,28 @@ impl<'a> Problem<'a> {
         let usable = self.logs.iter().flat_map(|log| log.usable.iter()).zip(&self.noise.known);
         let certainty = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
         let left = self.measured().zip(&prediction.shown_nm).zip(certainty).map(|((y, x), c)| c * (y - x));
-        let left = self.noise.innovations(left.collect());
+        let mut left: Vec<f64> = left.collect();
+        if let Some(mode) = prediction.ringing {
+            self.behind_mode(&mut left, mode);
+        }
+        let left = self.noise.innovations(left);
         left.into_iter()
             .zip(&self.noise.deviation)
             .zip(usable)
             .map(|((e, s), (usable, known))| if *usable && *known { e / s } else { 0.0 })
             .collect()
+    }
+
+    /// Takes off what the sensor's mode is seen to ring with for what is uncertain of the force.
+    fn behind_mode(&self, residual: &mut [f64], mode: (f64, f64)) {
+        let variance: Vec<f64> = self.noise.deviation.iter().map(|s| s * s).collect();
+        let mut from = 0;
+        for log in self.logs {
+            let own = from..from + log.len();
+            from = own.end;
+            let [of_force, of_all] = [&self.noise.of_force[own.clone()], &variance[own.clone()]];
+            innovations(&mut residual[own], mode, log.grid.step_s, of_force, of_all, &log.usable);
+        }
     }
 
     /// All parameters of a hypothesis.
