@@ -22,18 +22,16 @@ use super::term::Parameter;
 /// The disc where it does not move as the motor does.
 #[derive(Debug, Clone)]
 pub struct DiscMotion {
-    /// Its angle in each log with all of the form's parameters at 0.
-    pub angle_rad: Vec<Vec<f64>>,
+    /// Its angle in each log with all of the form's parameters at 0, in the ways in which it may be reckoned.
+    pub angle_rad: Vec<Vec<Vec<f64>>>,
     /// What a unit of each of the form's parameters adds to it in each log; empty where none does.
     pub angle_per_unit: Vec<Vec<Vec<f64>>>,
-    /// Error of its speed for an error of the torque that drives it, rad/s per N m.
-    pub speed_per_torque: f64,
 }
 
 impl DiscMotion {
-    /// Its angle in each log with these values of the form's parameters.
-    pub fn angle(&self, values: &[f64]) -> Vec<Vec<f64>> {
-        let mut angle_rad = self.angle_rad.clone();
+    /// Its angle in each log, reckoned in one of the ways, with these values of the form's parameters.
+    pub fn angle(&self, way: usize, values: &[f64]) -> Vec<Vec<f64>> {
+        let mut angle_rad = self.angle_rad[way].clone();
         for (value, logs) in values.iter().zip(&self.angle_per_unit) {
             for (angle_rad, unit) in angle_rad.iter_mut().zip(logs) {
                 angle_rad.iter_mut().zip(unit).for_each(|(angle, unit)| *angle += value * unit);
@@ -214,11 +212,16 @@ impl Balance {
     /// Solves a set of alternatives.
     pub fn solve(&self, alternatives: &[Alternative], set: &[usize]) -> Solved {
         let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
+        Solved { set: set.to_vec(), ..self.solve_forms(&chosen) }
+    }
+
+    /// Solves these forms; the set of what it gives is empty.
+    pub fn solve_forms(&self, chosen: &[&Alternative]) -> Solved {
         let mut response = self.response.clone();
         let mut base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
         let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
         let mut log_prior = 0.0;
-        for alternative in &chosen {
+        for alternative in chosen {
             if let Some(added) = &alternative.response {
                 response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
             }
@@ -272,7 +275,7 @@ impl Balance {
             posterior[(i, i)] += 1.0 / q.sd.powi(2);
         }
         let covariance = linear::factor(&posterior).inverse();
-        let waves = self.waves(&chosen, &p, &covariance);
+        let waves = self.waves(chosen, &p, &covariance);
         let slope = slope - &h * DVector::from_column_slice(&p);
         let parameters: Vec<&Parameter> = parameters.iter().collect();
         let at = Expansion { p: &p, parameters: &parameters, misfit, slope: &slope, curvature: &h };
@@ -283,7 +286,7 @@ impl Balance {
             residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
         }
         let std = (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
-        Solved { set: set.to_vec(), base: self.base.len(), p, std, log_evidence, residual }
+        Solved { set: Vec::new(), base: self.base.len(), p, std, log_evidence, residual }
     }
 
     /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.
@@ -314,11 +317,14 @@ impl Balance {
             .collect()
     }
 
-    /// What the base columns but the first make of the response, for the values of the base alone.
-    pub fn bearing(&self, residual: &[f64]) -> Vec<f64> {
-        let p = self.solve(&[], &[]).p;
+    /// What the columns but the base's first make of the response, beside these forms.
+    pub fn bearing(&self, beside: &[&Alternative]) -> Vec<f64> {
+        let Solved { p, residual, .. } = self.solve_forms(beside);
         let inertial = &self.base[0].1;
-        (0..self.response.len()).map(|i| self.response[i] - residual[i] - p[0] * inertial[i]).collect()
+        let added = |i: usize| beside.iter().filter_map(|a| Some(a.response.as_ref()?[i])).sum::<f64>();
+        (0..self.response.len())
+            .map(|i| self.response[i] + added(i) - residual[i] - p[0] * inertial[i])
+            .collect()
     }
 
     /// RMS over the used rows.
@@ -349,10 +355,62 @@ impl Balance {
         self.deviation.iter_mut().for_each(|d| *d *= factor);
         self.temper = slow_share(&pull, self.row_step_s).max(1.0);
     }
+
+    /// Takes back what [`Self::refit_noise`] has done.
+    fn forget_residuals(&mut self) {
+        self.deviation.copy_from_slice(&self.first_deviation);
+        self.temper = FIRST_TEMPER;
+    }
 }
 
-/// Sets with their evidence, best first; the empty set is among them.
-pub fn search(balance: &mut Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
+/// What proposes forms: of the effects that are wanted, for what these forms leave.
+pub type Propose<'p> = &'p dyn Fn(&Balance, Company<'_>, &dyn Fn(&str) -> bool) -> Vec<Alternative>;
+
+/// Forms that stand in a balance already, and what they leave of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Company<'a> {
+    /// The forms.
+    pub forms: &'a [&'a Alternative],
+    /// The residual.
+    pub residual: &'a [f64],
+}
+
+/// The forms that were looked for, and sets of them with their evidence, best first; the empty set is among them.
+///
+/// Orders and shapes are looked for where nothing else stands, and once more beside what was found: a mode that was fitted
+/// to another cause's torque is not the coupling's.
+pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<Alternative>, Vec<Solved>) {
+    let residual = balance.solve(&[], &[]).residual;
+    let mut alternatives = propose(balance, Company { forms: &[], residual: &residual }, &|_| true);
+    let found = search_sets(balance, &alternatives, most);
+    let best = &found[0].set;
+    let effect = |place: &usize| alternatives[*place].effect;
+    let mut more: Vec<Alternative> = Vec::new();
+    for again in best.iter().map(Some).chain([None]) {
+        let beside: Vec<usize> = best.iter().copied().filter(|place| Some(place) != again).collect();
+        if beside.is_empty() {
+            continue;
+        }
+        let forms: Vec<&Alternative> = beside.iter().map(|place| &alternatives[*place]).collect();
+        let residual = balance.solve(&alternatives, &beside).residual;
+        let wanted =
+            |id: &str| again.map_or(!best.iter().any(|b| effect(b) == id), |again| effect(again) == id);
+        more.extend(propose(balance, Company { forms: &forms, residual: &residual }, &wanted));
+    }
+    let same = |a: &Alternative, b: &Alternative| {
+        a.effect == b.effect && a.constants == b.constants && a.parameters.len() == b.parameters.len()
+    };
+    more.retain(|new| !alternatives.iter().any(|old| same(old, new)));
+    if more.is_empty() {
+        return (alternatives, found);
+    }
+    alternatives.extend(more);
+    balance.forget_residuals();
+    let found = search_sets(balance, &alternatives, most);
+    (alternatives, found)
+}
+
+fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
     let empty = balance.solve(alternatives, &[]);
     let mut all = vec![empty];
     for round in 0..2 {
@@ -440,13 +498,34 @@ mod tests {
     }
 
     #[test]
+    fn a_form_is_looked_for_again_beside_what_was_found() {
+        let wave = |k: f64| -> Vec<f64> { (0..ROWS).map(|i| (k * i as f64).sin()).collect() };
+        let noise = white(ROWS, 2);
+        let of = |((a, b), n): ((f64, f64), &f64)| 20.0 * a + 3.0 * b + n;
+        let response: Vec<f64> = wave(0.2).into_iter().zip(wave(0.5)).zip(&noise).map(of).collect();
+        let mut balance = balance(response);
+        let form = |effect, k: f64| Alternative {
+            constants: vec![("wave_number".into(), k)],
+            ..Alternative::columns(effect, vec![Parameter::amplitude("size", 30.0)], vec![wave(k)])
+        };
+        // The second cause's shape is seen only where the first one is taken off.
+        let propose = |_: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
+            let second = if company.forms.is_empty() { 0.7 } else { 0.5 };
+            [form("large", 0.2), form("small", second)].into_iter().filter(|f| wanted(f.effect)).collect()
+        };
+        let (alternatives, found) = search(&mut balance, &propose, 2);
+        let best: Vec<&str> = found[0].set.iter().map(|a| alternatives[*a].effect).collect();
+        assert_eq!(best.len(), 2, "{best:?}");
+        assert!((found[0].p[2] - 3.0).abs() < 0.2, "{:?}", found[0].p);
+    }
+
+    #[test]
     fn a_disc_turns_by_its_own_angle_and_what_the_parameters_add() {
         let disc = DiscMotion {
-            angle_rad: vec![vec![1.0, 2.0], vec![3.0]],
+            angle_rad: vec![vec![vec![1.0, 2.0], vec![3.0]]],
             angle_per_unit: vec![vec![vec![0.1, 0.2], vec![0.0]], vec![vec![0.0, 0.0], vec![1.0]]],
-            speed_per_torque: 0.0,
         };
-        assert_eq!(disc.angle(&[10.0, -1.0]), [vec![2.0, 4.0], vec![2.0]]);
-        assert_eq!(disc.angle(&[]), disc.angle_rad);
+        assert_eq!(disc.angle(0, &[10.0, -1.0]), [vec![2.0, 4.0], vec![2.0]]);
+        assert_eq!(disc.angle(0, &[]), disc.angle_rad[0]);
     }
 }

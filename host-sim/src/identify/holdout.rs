@@ -4,7 +4,7 @@
 //! the training logs' values. What belongs to one log alone, as the phase of a pattern under an incremental encoder, is
 //! not known for another one and left out.
 
-use super::balance::{Alternative, Balance, Solved};
+use super::balance::{Alternative, Balance, Company, Solved};
 use super::contact::log::ContactLog;
 use super::contact::problem::Problem;
 use super::drive::{self, DriveLog, DriveScales};
@@ -126,7 +126,7 @@ pub fn errors(
                     let (_, fixed) = drive_alternatives(found, drive, drives, Some(rig));
                     let solved = &drive.solved[found.place(Part::Drive).unwrap_or(0)];
                     let forms = known_forms(drive, solved, &fixed).filter_map(|(form, p)| Some((form, p?)));
-                    judge::following(&prepared, forms, judge::torque_error(drive)).map(|(logs, _)| logs)
+                    judge::following(&prepared, forms).map(|(_, ways)| judge::known_by(&ways, cause.way))
                 }
             }
             _ => None,
@@ -332,7 +332,7 @@ fn drive_alternatives(
             logs,
             scales: part.drive_scales.as_ref().unwrap_or(&scales),
             balance: &balance,
-            residual: &residual,
+            company: Company { forms: &[], residual: &residual },
             rotary: !found.linear_stage,
             inertia: none.p[drive::INERTIA],
             fixed: Some(&own.constants),
@@ -372,7 +372,7 @@ fn normal_load_errors(
             logs,
             scales,
             balance: &balance,
-            residual: &balance.response,
+            company: Company { forms: &[], residual: &balance.response },
             fixed: Some(&own.constants),
         };
         fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.normal_load(&view)));

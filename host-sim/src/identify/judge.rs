@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::balance::{self, Alternative, Balance, Solved};
+use super::balance::{self, Alternative, Balance, Company, Solved};
 use super::contact::baseline as contact_baseline;
 use super::contact::change::{Change, ContactTerm};
 use super::contact::log::ContactLog;
@@ -117,6 +117,9 @@ pub struct ContactPart {
 
 /// A cause in the drive that moves the contact.
 pub struct DiscCause {
+    /// In which of its form's ways the disc's motion is reckoned, the one with which the baseline leaves least, and the next
+    /// best one: as far as the two differ it is not known.
+    pub way: [usize; 2],
     /// Its id.
     pub effect: &'static str,
     /// Residuals of the baseline with the motion as logged, N m.
@@ -168,19 +171,12 @@ pub fn contact_terms(
 pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Linear {
     let scales = DriveScales::new(logs);
     let mut balance = drive::balance(logs, prior, &scales);
-    let base = balance.solve(&[], &[]);
-    let inertia = base.p[drive::INERTIA];
-    let view = DriveView {
-        logs,
-        scales: &scales,
-        balance: &balance,
-        residual: &base.residual,
-        rotary,
-        inertia,
-        fixed: None,
+    let inertia = balance.solve(&[], &[]).p[drive::INERTIA];
+    let propose = |balance: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
+        let view = DriveView { logs, scales: &scales, balance, company, rotary, inertia, fixed: None };
+        LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.drive(&view)).collect()
     };
-    let alternatives: Vec<Alternative> = LIBRARY.iter().flat_map(|effect| effect.drive(&view)).collect();
-    let solved = balance::search(&mut balance, &alternatives, MOST_CAUSES);
+    let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
     Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), normal_load_scales: None }
 }
@@ -200,12 +196,11 @@ fn drive_inertia(logs: &[Log]) -> Result<f64, InputError> {
 pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
     let scales = NormalLoadScales::new(logs);
     let mut balance = normal_load::balance(logs, rig, &scales);
-    let base = balance.solve(&[], &[]);
-    let view =
-        NormalLoadView { logs, scales: &scales, balance: &balance, residual: &base.residual, fixed: None };
-    let alternatives: Vec<Alternative> =
-        LIBRARY.iter().flat_map(|effect| effect.normal_load(&view)).collect();
-    let solved = balance::search(&mut balance, &alternatives, MOST_CAUSES);
+    let propose = |balance: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
+        let view = NormalLoadView { logs, scales: &scales, balance, company, fixed: None };
+        LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.normal_load(&view)).collect()
+    };
+    let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
     Linear { balance, alternatives, solved, signal, drive_scales: None, normal_load_scales: Some(scales) }
 }
@@ -364,13 +359,17 @@ pub fn judge(
         let parted = drive.as_ref().and_then(|drive| {
             let best = drive.solved.first()?;
             let forms = best.forms(&drive.alternatives).map(|(form, places)| (form, &best.p[places]));
-            following(&logs, forms, torque_error(drive))
+            following(&logs, forms)
         });
-        if let Some((following, effect)) = parted {
+        if let Some((effect, ways)) = parted {
             let (residual_nm, as_logged) = left_by_baseline(&logs, &baseline);
-            if left_by_baseline(&following, &baseline).1 < as_logged {
-                disc_cause = Some(DiscCause { effect, residual_nm });
-                logs = following;
+            let mut left: Vec<(usize, f64)> =
+                ways.par_iter().map(|logs| left_by_baseline(logs, &baseline).1).enumerate().collect();
+            left.sort_by(|a, b| a.1.total_cmp(&b.1));
+            if left[0].1 < as_logged {
+                let way = [left[0].0, left.get(1).unwrap_or(&left[0]).0];
+                disc_cause = Some(DiscCause { effect, way, residual_nm });
+                logs = known_by(&ways, way);
             }
         }
         if drive.is_none() {
@@ -397,8 +396,8 @@ pub fn judge(
                     search::sizes(&problem, &ranked.fit, fitted.clone())
                 }
             };
-            let sizes = found.ranked.par_iter().map(sizes).collect();
-            let best = &found.ranked[0].fit;
+            let sizes: Vec<Vec<f64>> = found.ranked.par_iter().map(sizes).collect();
+            let best = of_largest_posterior(&found.ranked, &sizes);
             let best = problem.change(&best.terms, &best.p);
             (problem.noise.clone(), found.ranked, sizes, best)
         };
@@ -420,6 +419,24 @@ pub fn judge(
             &DrivePrior { inertia: None, coulomb: None, viscous: None },
             !linear_stage,
         ));
+    }
+    for (part, what, linear) in [
+        (Part::Drive, "the drive", &mut drive),
+        (Part::Pressure, "the normal-load actuator", &mut normal_load),
+    ] {
+        if linear.as_ref().is_some_and(|linear| linear.balance.used.is_empty()) {
+            *linear = None;
+            notes.push(format!(
+                "no row of the balance of the {} can be used: {what} is not looked at",
+                part.name()
+            ));
+        }
+    }
+    if contact.as_ref().is_some_and(rest::nothing_is_known) {
+        notes.push(
+            "no sample of the friction torque is known to a tenth of its usual size: nothing can be said of the friction"
+                .to_string(),
+        );
     }
     progress("table of causes");
     let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
@@ -448,6 +465,15 @@ pub fn judge(
     Ok(judgement)
 }
 
+/// The fit of the set that is the likeliest with its prior and in which no cause is too small to be told: a channel has an end
+/// where more says so than that nothing is lost by one.
+fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], sizes: &[Vec<f64>]) -> &'r Fit {
+    let posterior = |r: &search::Ranked| r.log_evidence + LOG_PRIOR * r.fit.terms.len() as f64;
+    let told = ranked.iter().zip(sizes).filter(|(_, sizes)| sizes.iter().all(|size| *size > MODEL_FORM));
+    let best = told.map(|(r, _)| r).max_by(|a, b| posterior(a).total_cmp(&posterior(b)));
+    &best.unwrap_or(&ranked[0]).fit
+}
+
 /// Where the friction channel shows an end of its range, the drive's balance has no friction torque; `None` where it does not.
 pub fn without_ends(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
     let ends = change.ends_nm?;
@@ -458,33 +484,30 @@ pub fn without_ends(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactL
 
 /// Where the normal channel shows its end, the actuator's balance has no normal force; `None` where it does not.
 pub fn without_normal_end(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
-    let end_n = change.normal_end_n?;
-    // A log that is at the end most of the time has less noise than its channel.
-    let noise_n = logs.iter().map(|log| log.normal_noise_n).fold(0.0, f64::max);
+    let (end_n, knee_n) = change.normal_end_n?;
     let mut seen = logs.to_vec();
-    seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n, noise_n));
+    seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n, knee_n));
     Some(seen)
 }
 
-/// What the drive's best set leaves, as an error of the torque that moves the disc, N m.
-pub fn torque_error(drive: &Linear) -> f64 {
-    drive.rest(0).size * drive.balance.scale
-}
-
-/// The logs with the disc's own motion, where one of these forms, with these values, parts it from the motor's encoder; the
-/// cause's id.
+/// The logs with the disc's own motion, reckoned in each way, where one of these forms, with these values, parts it from the
+/// motor's encoder; the cause's id before them.
 pub fn following<'f>(
     logs: &[ContactLog],
     mut forms: impl Iterator<Item = (&'f Alternative, &'f [f64])>,
-    torque_error_nm: f64,
-) -> Option<(Vec<ContactLog>, &'static str)> {
+) -> Option<(&'static str, Vec<Vec<ContactLog>>)> {
     let (effect, disc, values) =
         forms.find_map(|(form, values)| Some((form.effect, form.disc.as_ref()?, values)))?;
-    let mut logs = logs.to_vec();
-    for (log, angle_rad) in logs.iter_mut().zip(disc.angle(values)) {
-        log.follow(&angle_rad, disc.speed_per_torque * torque_error_nm);
-    }
-    Some((logs, effect))
+    let of_way = |way: usize| {
+        let angles = disc.angle(way, values);
+        logs.iter().zip(&angles).map(|(log, angle_rad)| log.following(angle_rad)).collect()
+    };
+    Some((effect, (0..disc.angle_rad.len()).map(of_way).collect()))
+}
+
+/// The logs of the first of two ways, with the difference of the two as the error of the sliding speed.
+pub fn known_by(ways: &[Vec<ContactLog>], [best, next]: [usize; 2]) -> Vec<ContactLog> {
+    ways[best].iter().zip(&ways[next]).map(|(log, other)| log.known_as_well_as(other)).collect()
 }
 
 /// What the baseline leaves of these logs with a noise model of its own, N m, and its mean square, (N m)².

@@ -148,6 +148,11 @@ impl Ground {
     }
 }
 
+/// Whether no sample of the channel is well known.
+pub fn nothing_is_known(contact: &ContactPart) -> bool {
+    Ground::new(contact).rows.is_empty()
+}
+
 /// Of the contact's balance; `disc_cause` where the hypothesis has it.
 pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscCause>) -> Rest {
     let problem = contact.problem();
@@ -163,6 +168,10 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
     }
     let ground = Ground::new(contact);
     let residual = ground.left(&problem, fit);
+    if ground.rows.is_empty() {
+        // What cannot be looked at is not explained.
+        return Rest { size: 1.0, share: 1.0, ..Rest::default() };
+    }
     let (rest, left) = ground.structured(&residual);
     let before = as_logged.as_ref().or(none).map_or(rest, |none| ground.structured(&ground.in_units(none)).0);
     Rest {

@@ -19,8 +19,17 @@ use super::term::Parameter;
 
 /// A mode turns by less than this in a step within a sample, rad: its frequency is then right to φ²/24, 2e-4.
 const TURN_IN_A_STEP: f64 = 0.06;
-/// Pull towards the observed shaft torque, per sample.
-const PULL: f64 = 0.05;
+/// Pull towards the observed shaft torque, per sample, with which shapes are compared: far from the truth only a disc that is
+/// held near the motor has a motion that resembles its own.
+const PULL: f64 = 0.1;
+/// Pulls with which a spring's numbers are then fitted: what pulls also hides. Play is left at the first one, since the
+/// instants at which it closes cannot be told for long.
+const WEAKER: [f64; 3] = [0.05, 0.015, 0.005];
+/// Pulls with which the disc's motion is reckoned: the friction balance says which of them is best.
+const RECKONED: [f64; 4] = [0.3, 0.1, 0.03, 0.005];
+/// No pull is quicker than this share of the mode, which turns by so much in a sample: else the pull would make the torque in
+/// the spring's place, whatever that is of.
+const SLOWER_THAN_MODE: f64 = 0.5;
 /// Points of the grid from which a fit starts, its iterations, and step and longest move of the logarithms.
 const STARTS: usize = 3;
 const ITERATIONS: usize = 12;
@@ -49,13 +58,20 @@ pub struct TwoMass {
 }
 
 /// Shaft torque and angle of the disc for a log.
-fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]) -> (Vec<f64>, Vec<f64>) {
+fn shaft_torque(
+    log: &DriveLog,
+    numbers: &TwoMass,
+    inertia: f64,
+    bearing: &[f64],
+    pull: f64,
+) -> (Vec<f64>, Vec<f64>) {
     let n = log.len();
     let dt = log.grid.step_s;
     let disc = numbers.disc_share * inertia;
     let omega = std::f64::consts::TAU * numbers.mode_hz;
     let substeps = (omega * dt / TURN_IN_A_STEP).ceil().max(1.0) as usize;
     let h = dt / substeps as f64;
+    let pull = pull.min(SLOWER_THAN_MODE * omega * dt);
     let (k, d) = (disc * omega * omega, 2.0 * numbers.damping_ratio * disc * omega);
     let half = 0.5 * numbers.gap_rad;
     let free = vec![0.0; n];
@@ -77,32 +93,37 @@ fn shaft_torque(log: &DriveLog, numbers: &TwoMass, inertia: f64, bearing: &[f64]
             ((x[i] - x[i - 1]) / dt, if i + 1 < n { (x[i + 1] - x[i]) / dt } else { (x[i] - x[i - 1]) / dt });
         let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
         let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
-        let (mut motor, mut sum) = (x[i - 1], 0.0);
-        for s in 0..substeps {
-            let part = (s as f64 + 0.5) / substeps as f64;
-            let speed = va + (vb - va) * part;
-            motor += speed * h;
-            let twist = motor - q;
-            let torque = if twist > half {
-                (k * (twist - half) + d * (speed - w)).max(if half > 0.0 { 0.0 } else { f64::NEG_INFINITY })
+        let torque = |twist: f64, rate: f64| {
+            if twist > half {
+                (k * (twist - half) + d * rate).max(if half > 0.0 { 0.0 } else { f64::NEG_INFINITY })
             } else if twist < -half {
-                (k * (twist + half) + d * (speed - w)).min(if half > 0.0 { 0.0 } else { f64::INFINITY })
+                (k * (twist + half) + d * rate).min(if half > 0.0 { 0.0 } else { f64::INFINITY })
             } else if half > 0.0 {
                 0.0
             } else {
-                k * twist + d * (speed - w)
-            };
-            w += h * (torque - (friction[i - 1] + (friction[i] - friction[i - 1]) * part)) / disc;
-            q += h * w;
-            sum += torque;
+                k * twist + d * rate
+            }
+        };
+        for s in 0..substeps {
+            // Drift, kick, drift: motor and disc are seen at the same instant, in the middle of the step.
+            let part = (s as f64 + 0.5) / substeps as f64;
+            let motor = x[i - 1] + dt * part * (va + 0.5 * (vb - va) * part);
+            q += 0.5 * h * w;
+            let shaft = torque(motor - q, va + (vb - va) * part - w);
+            w += h * (shaft - (friction[i - 1] + (friction[i] - friction[i - 1]) * part)) / disc;
+            q += 0.5 * h * w;
         }
-        out[i] = sum / substeps as f64;
-        if observed[i].abs() > sure || half == 0.0 {
-            let target = x[i] - observed[i] / k - observed[i].signum() * half;
-            let off = target - q;
-            q += PULL * off;
-            w += 0.06 * PULL * off / dt;
-        }
+        out[i] = torque(x[i] - q, vb - w);
+        // In the gap the torque does not say where the disc is, but that it is at the other end where the motor says so.
+        let off = if out[i] != 0.0 {
+            (out[i] - observed[i]) / k
+        } else if observed[i].abs() > sure {
+            x[i] - observed[i] / k - observed[i].signum() * half - q
+        } else {
+            0.0
+        };
+        q += pull * off;
+        w += 0.06 * pull * off / dt;
         if !q.is_finite() || !w.is_finite() || q.abs() > 1e9 {
             return (vec![f64::NAN; n], disc_position);
         }
@@ -116,6 +137,7 @@ fn alternative(
     view: &DriveView<'_>,
     numbers: &TwoMass,
     bearing: &[f64],
+    pull: f64,
 ) -> Option<Alternative> {
     let n = numbers;
     let within = |[low, high]: [f64; 2], value: f64| (low..high).contains(&value);
@@ -127,11 +149,9 @@ fn alternative(
         return None;
     }
     let mut added = Vec::with_capacity(view.balance.response.len());
-    let mut positions = Vec::new();
     let mut from = 0;
     for log in view.logs {
-        let (torque, disc_position) =
-            shaft_torque(log, numbers, view.inertia, &bearing[from..from + log.len()]);
+        let (torque, _) = shaft_torque(log, numbers, view.inertia, &bearing[from..from + log.len()], pull);
         from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
@@ -144,7 +164,6 @@ fn alternative(
             return None;
         }
         added.extend(log.filtered(&change));
-        positions.push(disc_position);
     }
     let disc = numbers.disc_share * view.inertia;
     let omega = std::f64::consts::TAU * numbers.mode_hz;
@@ -160,12 +179,7 @@ fn alternative(
     Some(Alternative {
         form: format!("{:.0} Hz, gap {:.2e} rad", numbers.mode_hz, numbers.gap_rad),
         response: Some(added),
-        // A torque error near the mode, where it lasts longest.
-        disc: Some(DiscMotion {
-            angle_rad: positions,
-            angle_per_unit: Vec::new(),
-            speed_per_torque: 1.0 / (disc * omega),
-        }),
+        disc: Some(DiscMotion { angle_rad: Vec::new(), angle_per_unit: Vec::new() }),
         base_shift: vec![(INERTIA, -disc)],
         constants,
         ..Alternative::columns(effect, Vec::<Parameter>::new(), Vec::new())
@@ -173,9 +187,13 @@ fn alternative(
 }
 
 /// The best shape of a coupling: a coarse grid, then a fit from its best points.
-pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMass>) -> Vec<Alternative> {
+pub fn alternative_of_grid(
+    effect: &'static str,
+    view: &DriveView<'_>,
+    grid: Vec<TwoMass>,
+) -> Option<Alternative> {
     if !view.rotary || view.inertia <= 0.0 {
-        return Vec::new();
+        return None;
     }
     if let Some(fixed) = view.fixed {
         let get = |name: &str| fixed.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
@@ -183,24 +201,70 @@ pub fn alternatives(effect: &'static str, view: &DriveView<'_>, grid: Vec<TwoMas
         let damping_ratio = get("damping_nm_s_per_rad") * std::f64::consts::PI * mode_hz / k.max(1e-12);
         let numbers =
             TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
-        let bearing = view.balance.bearing(view.residual);
-        return alternative(effect, view, &numbers, &bearing).into_iter().collect();
+        let bearing = view.balance.bearing(&[]);
+        return alternative(effect, view, &numbers, &bearing, PULL)
+            .map(|form| reckoned(view, &numbers, &bearing, form));
     }
-    // What the base alone makes of the bearing.
-    let bearing = view.balance.bearing(view.residual);
-    let trial = |numbers: &TwoMass| -> Option<Trial> {
-        let alternative = alternative(effect, view, numbers, &bearing)?;
-        let solved = view.balance.solve(std::slice::from_ref(&alternative), &[0]);
+    let trial = |numbers: &TwoMass, bearing: &[f64], pull: f64| -> Option<Trial> {
+        let alternative = alternative(effect, view, numbers, bearing, pull)?;
+        let solved = view.balance.solve_forms(&joined(view, &alternative));
         Some(Trial { numbers: *numbers, alternative, solved })
     };
-    let mut tried: Vec<Trial> = grid.par_iter().filter_map(trial).collect();
+    let bearing = view.balance.bearing(view.company.forms);
+    let mut tried: Vec<Trial> =
+        grid.par_iter().filter_map(|numbers| trial(numbers, &bearing, PULL)).collect();
     tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
+    // Of each width the best, so that the fits do not all start in one valley.
+    let mut widths: Vec<f64> = Vec::new();
+    tried.retain(|t| {
+        let new = t.numbers.gap_rad == 0.0 || !widths.contains(&t.numbers.gap_rad);
+        widths.push(t.numbers.gap_rad);
+        new
+    });
     tried.truncate(STARTS);
-    let refined = tried.into_iter().filter_map(|start| refined(view, start, &trial));
-    let best = refined.max_by(|(a, of_a), (b, of_b)| {
+    let refined_by = |start: Trial, bearing: &[f64], pull: f64| {
+        refined(view, start, &|numbers: &TwoMass| trial(numbers, bearing, pull))
+    };
+    let of_starts = tried.into_iter().filter_map(|start| refined_by(start, &bearing, PULL));
+    let best = of_starts.max_by(|(a, of_a), (b, of_b)| {
         (a.solved.log_evidence + of_a).total_cmp(&(b.solved.log_evidence + of_b))
     });
-    best.map(|(best, log_prior)| Alternative { log_prior, ..best.alternative }).into_iter().collect()
+    let (best, mut log_prior) = best?;
+    let bearing = view.balance.bearing(&joined(view, &best.alternative));
+    let mut numbers = best.numbers;
+    if numbers.gap_rad == 0.0 {
+        for pull in WEAKER {
+            let Some((better, occam)) =
+                trial(&numbers, &bearing, pull).and_then(|t| refined_by(t, &bearing, pull))
+            else {
+                break;
+            };
+            (numbers, log_prior) = (better.numbers, occam);
+        }
+    }
+    let found = alternative(effect, view, &numbers, &bearing, PULL)?;
+    Some(Alternative { log_prior, ..reckoned(view, &numbers, &bearing, found) })
+}
+
+/// With the disc's motion in each way.
+fn reckoned(view: &DriveView<'_>, numbers: &TwoMass, bearing: &[f64], mut form: Alternative) -> Alternative {
+    let starts = view.logs.iter().scan(0, |from, log| Some(std::mem::replace(from, *from + log.len())));
+    let logs: Vec<(&DriveLog, usize)> = view.logs.iter().zip(starts).collect();
+    let angles = |pull: f64| -> Vec<Vec<f64>> {
+        let of = |(log, from): &(&DriveLog, usize)| {
+            shaft_torque(log, numbers, view.inertia, &bearing[*from..*from + log.len()], pull).1
+        };
+        logs.iter().map(of).collect()
+    };
+    if let Some(disc) = &mut form.disc {
+        disc.angle_rad = RECKONED.map(angles).to_vec();
+    }
+    form
+}
+
+/// A form beside those that stand in the balance.
+fn joined<'a>(view: &'a DriveView<'_>, form: &'a Alternative) -> Vec<&'a Alternative> {
+    view.company.forms.iter().copied().chain([form]).collect()
 }
 
 /// A coupling with what the balance makes of it.

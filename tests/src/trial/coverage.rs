@@ -40,7 +40,12 @@ impl Fitted {
             Err(why) => format!("seed {}: {why}", self.seed),
             Ok(list) => {
                 let held = list.iter().filter(|i| i.holds()).count();
-                format!("seed {}: {held} of {} intervals hold the truth", self.seed, list.len())
+                let missed = list
+                    .iter()
+                    .filter(|i| !i.holds())
+                    .map(|i| format!("; {} {:.4} for {:.4}", i.name, 0.5 * (i.ends.0 + i.ends.1), i.truth));
+                let missed: String = missed.collect();
+                format!("seed {}: {held} of {} intervals hold the truth{missed}", self.seed, list.len())
             }
         }
     }

@@ -27,8 +27,8 @@ pub struct Change {
     pub block: Option<(f64, f64)>,
     /// Ends of the friction channel, N m.
     pub ends_nm: Option<(f64, f64)>,
-    /// Upper end of the normal channel, N.
-    pub normal_end_n: Option<f64>,
+    /// Upper end of the normal channel and the width over which it bends there, N.
+    pub normal_end_n: Option<(f64, f64)>,
     /// Way of the root in place of the logged one, m, per log and point.
     pub root_m: Option<Column>,
 }

@@ -4,7 +4,7 @@ use super::ringing::Ringing;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
-use crate::identify::filters::{gaussian, gradient, local_maximum, shifted, smoothed_flat};
+use crate::identify::filters::{gaussian, gradient, local_maximum, rms, shifted, smoothed_flat};
 use crate::identify::grid::Grid;
 use crate::identify::noise;
 use crate::input_error::InputError;
@@ -139,14 +139,21 @@ impl ContactLog {
         })
     }
 
-    /// Replaces the disc's angle by one that is known better; its speed's error is in rad/s.
-    pub fn follow(&mut self, angle_rad: &[f64], speed_error: f64) {
-        let step_s = self.grid.step_s;
-        self.angle_rad = angle_rad.to_vec();
-        self.root_m = angle_rad.iter().map(|a| self.radius_m * a).collect();
-        let speed: Vec<f64> = gradient(&self.root_m).iter().map(|d| d / step_s).collect();
-        self.root_speed_m_s = gaussian(&speed, 3.0, 0);
-        self.speed_noise_m_s = self.speed_noise_m_s.hypot(self.radius_m * speed_error);
+    /// With the disc's own angle in place of the encoder's.
+    #[must_use]
+    pub fn following(&self, angle_rad: &[f64]) -> Self {
+        let root_m: Vec<f64> = angle_rad.iter().map(|a| self.radius_m * a).collect();
+        let speed: Vec<f64> = gradient(&root_m).iter().map(|d| d / self.grid.step_s).collect();
+        let root_speed_m_s = gaussian(&speed, 3.0, 0);
+        Self { angle_rad: angle_rad.to_vec(), root_m, root_speed_m_s, ..self.clone() }
+    }
+
+    /// With its difference from another reckoning as the error of the sliding speed.
+    #[must_use]
+    pub fn known_as_well_as(&self, other: &Self) -> Self {
+        let pairs = self.root_speed_m_s.iter().zip(&other.root_speed_m_s);
+        let error = rms(&pairs.map(|(a, b)| a - b).collect::<Vec<_>>());
+        Self { speed_noise_m_s: self.speed_noise_m_s.hypot(error), ..self.clone() }
     }
 
     /// Values of the friction channel beyond which it is at an end of its range, N m.
@@ -162,9 +169,9 @@ impl ContactLog {
         self.leave_out(ends);
     }
 
-    /// Takes out the points at which the normal channel, with this noise, shows its upper end.
-    pub fn leave_out_normal_end(&mut self, end_n: f64, noise_n: f64) {
-        let near = END_NOISES * noise_n;
+    /// Takes out the points at which the normal channel shows its upper end, to which it bends within this width.
+    pub fn leave_out_normal_end(&mut self, end_n: f64, knee_n: f64) {
+        let near = END_NOISES * knee_n;
         let ends = self.normal_n.iter().map(|x| *x > end_n - near).collect();
         self.leave_out(ends);
     }

@@ -22,6 +22,8 @@ const TORQUE_WIDTH: f64 = 2.0;
 const TOUCHING: f64 = 0.1;
 /// Load over M1's torque is a line within this share: the mechanism's friction and springs.
 const LINE_WITHIN: f64 = 0.03;
+/// ln of an end's width over the channel's noise: a converter ends within its noise, an amplifier bends before it does.
+const KNEE_WITHIN: f64 = 1.5;
 
 /// The end at which samples of a log pile up: more of them in the last band of values than in the next one below, thrice over.
 /// No log goes beyond it; one that rests just below it says nothing against it.
@@ -115,24 +117,27 @@ impl AdcSaturation {
             known("normal_high", high / scale, 0.5 * noise / scale),
             known("load_per_torque", gain, LINE_WITHIN * gain.abs()),
             known("load_without_torque", offset, LINE_WITHIN),
+            Parameter::logarithm("normal_knee", noise / scale, KNEE_WITHIN),
         ];
         let start = parameters.iter().map(|p| p.mean).collect();
         let load: Vec<Vec<f64>> = view.logs.iter().map(|log| log.load_n.clone()).collect();
         let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
-            let near = p[0] * scale - END_NOISES * noise;
+            let knee = scale * p[3].exp();
+            let near = p[0] * scale - END_NOISES * knee;
             let of = |(load, torque): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
                 let factor = |(n, t): (&f64, &f64)| {
-                    let at_end = 1.0 / (1.0 + (-(n - near) / noise).clamp(-30.0, 30.0).exp());
+                    let at_end = 1.0 / (1.0 + (-(n - near) / knee).clamp(-30.0, 30.0).exp());
                     at_end * ((p[1] * t + p[2]) * scale / n.max(1e-9)).max(1.0).ln()
                 };
                 load.iter().zip(torque).map(factor).collect()
             };
             change.add_log_factor(&[load.iter().zip(&torque).map(of).collect()], &[1.0]);
-            change.normal_end_n = Some(p[0] * scale);
+            change.normal_end_n = Some((p[0] * scale, knee));
         });
         let export = move |p: &[f64]| {
-            let names = ["normal_high_n", "load_n_per_m1_torque_nm", "load_without_m1_torque_n"].map(String::from);
-            names.into_iter().zip(p.iter().map(|x| x * scale)).collect()
+            let names = ["normal_high_n", "load_n_per_m1_torque_nm", "load_without_m1_torque_n", "normal_knee_n"];
+            let values = [p[0], p[1], p[2], p[3].exp()].map(|x| x * scale);
+            names.map(String::from).into_iter().zip(values).collect()
         };
         Some(ContactTerm { form: "normal", ..term }.exported(move |p, _| export(p)))
     }

@@ -2,7 +2,7 @@
 
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
-use crate::identify::two_mass::{TwoMass, alternatives};
+use crate::identify::two_mass::{TwoMass, alternative_of_grid};
 
 /// The effect.
 pub(super) struct Backlash;
@@ -17,11 +17,13 @@ impl Effect for Backlash {
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
-        let grid = [40.0, 80.0].into_iter().flat_map(|mode_hz| {
-            [0.35, 0.65].into_iter().flat_map(move |disc_share| {
-                [0.003, 0.01, 0.03, 0.08].map(|gap_rad| TwoMass { mode_hz, damping_ratio: 0.2, disc_share, gap_rad })
-            })
-        });
-        alternatives("backlash", view, grid.collect())
+        let mut grid = Vec::new();
+        for (mode_hz, disc_share) in [(40.0, 0.35), (40.0, 0.65), (80.0, 0.35), (80.0, 0.65)] {
+            for damping_ratio in [0.05, 0.2] {
+                let of_gap = |gap_rad| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad };
+                grid.extend([0.003, 0.01, 0.03, 0.05, 0.08].map(of_gap));
+            }
+        }
+        alternative_of_grid("backlash", view, grid).into_iter().collect()
     }
 }

@@ -68,10 +68,8 @@ impl EncoderEccentricity {
             }
         }
         let disc = DiscMotion {
-            angle_rad: view.logs.iter().map(|log| log.position.clone()).collect(),
+            angle_rad: vec![view.logs.iter().map(|log| log.position.clone()).collect()],
             angle_per_unit,
-            // The error is known to its own share, whatever the torque's.
-            speed_per_torque: 0.0,
         };
         // Cosine and sine of each harmonic, log after log.
         const EACH: usize = LARGE_OF_HARMONIC_RAD.len();

@@ -52,7 +52,7 @@ impl Effect for M1Ripple {
             // The position dwells at the steps of the force, where a spectrum shows all orders alike.
             for own_phase in [false, true] {
                 let orders =
-                    waves::joint(view.balance, &position, view.residual, &candidates, MOST_ORDERS, own_phase);
+                    waves::joint(view.balance, &position, view.company, &candidates, MOST_ORDERS, own_phase);
                 for count in 1..=orders.len() {
                     all.push(make.alternative(&orders[..count], candidates.len(), own_phase));
                 }

@@ -41,7 +41,7 @@ impl Effect for M2Ripple {
         if let Some(fixed) = view.fixed {
             return make.alternatives(&fixed_orders(fixed), 1);
         }
-        let (x, r) = waves::picked(view.balance, &positions.concat(), view.residual);
+        let (x, r) = waves::picked(view.balance, &positions.concat(), view.company.residual);
         let candidates: Vec<f64> = if view.rotary {
             // A wave must not turn by more than a third of its period from row to row.
             let fastest = view.scales.speed * view.balance.row_step_s;

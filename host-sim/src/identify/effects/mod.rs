@@ -4,7 +4,7 @@ pub mod coordinates;
 mod stribeck_curve;
 pub mod waves;
 
-use crate::identify::balance::{Alternative, Balance};
+use crate::identify::balance::{Alternative, Balance, Company};
 use crate::identify::contact::change::{Change, ContactTerm};
 use crate::identify::contact::log::ContactLog;
 use crate::identify::drive::{DriveLog, DriveScales};
@@ -36,8 +36,8 @@ pub struct DriveView<'a> {
     pub scales: &'a DriveScales,
     /// The balance that the columns belong to.
     pub balance: &'a Balance,
-    /// What the base leaves of it: says where a search begins.
-    pub residual: &'a [f64],
+    /// What stands in it already, and leaves: says where a search begins.
+    pub company: Company<'a>,
     /// Whether the motion is a turn.
     pub rotary: bool,
     /// What the base makes of the inertia.
@@ -72,8 +72,8 @@ pub struct NormalLoadView<'a> {
     pub scales: &'a NormalLoadScales,
     /// The balance that the columns belong to.
     pub balance: &'a Balance,
-    /// What the base leaves of it.
-    pub residual: &'a [f64],
+    /// What stands in it already, and leaves: says where a search begins.
+    pub company: Company<'a>,
     /// Shape found on other logs: only this one is wanted.
     pub fixed: Option<&'a [(String, f64)]>,
 }

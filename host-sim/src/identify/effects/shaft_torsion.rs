@@ -2,7 +2,7 @@
 
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
-use crate::identify::two_mass::{TwoMass, alternatives};
+use crate::identify::two_mass::{TwoMass, alternative_of_grid};
 
 /// The effect.
 pub(super) struct ShaftTorsion;
@@ -22,6 +22,6 @@ impl Effect for ShaftTorsion {
                 [0.35, 0.65].map(|disc_share| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad: 0.0 })
             })
         });
-        alternatives("shaft_torsion", view, grid.collect())
+        alternative_of_grid("shaft_torsion", view, grid.collect()).into_iter().collect()
     }
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::identify::balance::{Alternative, Balance};
+use crate::identify::balance::{Alternative, Balance, Company};
 use crate::identify::contact::problem::FREEDOM;
 use crate::identify::linear;
 use crate::identify::term::Parameter;
@@ -54,13 +54,13 @@ pub fn lines(x: &[Vec<f64>], r: &[Vec<f64>], candidates: &[f64], most: usize, ov
     found
 }
 
-/// Wave numbers that together with the base columns leave least, one after the other, at most `most`: for a position that
+/// Wave numbers that together with the base columns and those of `company` leave least, one after the other, at most `most`: for a position that
 /// dwells at few values, where all orders look alike and only the whole balance tells them apart. With a phase for each log
 /// where `own_phase` is set.
 pub fn joint(
     balance: &Balance,
     position: &[f64],
-    residual: &[f64],
+    company: Company<'_>,
     candidates: &[f64],
     most: usize,
     own_phase: bool,
@@ -69,7 +69,7 @@ pub fn joint(
     let scaled = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
         used.iter().map(|&i| of(i) / balance.deviation[i]).collect()
     };
-    let y = scaled(&|i| residual[i]);
+    let y = scaled(&|i| company.residual[i]);
     let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
     // The rows over which a wave has one phase.
     let starts = if own_phase { balance.starts.as_slice() } else { &[0] };
@@ -85,7 +85,9 @@ pub fn joint(
         }
         h
     };
-    let mut columns: Vec<Vec<f64>> = balance.base.iter().map(|(_, column)| scaled(&|i| column[i])).collect();
+    let known = balance.base.iter().map(|(_, column)| column);
+    let known = known.chain(company.forms.iter().flat_map(|form| &form.columns));
+    let mut columns: Vec<Vec<f64>> = known.map(|column| scaled(&|i| column[i])).collect();
     let mut found = Vec::new();
     for _ in 0..most {
         // What a wave explains beside these columns, by Schur's complement: those are factored once for all waves.
@@ -298,8 +300,20 @@ mod tests {
         let base = vec![(Parameter::amplitude("base", 10.0), of_base)];
         let balance = Balance::new(residual.clone(), base, &[log(), log()], 1.0);
         let candidates: Vec<f64> = (1..30).map(f64::from).collect();
-        let found = |own| joint(&balance, &position, &residual, &candidates, 2, own);
+        let alone = Company { forms: &[], residual: &residual };
+        let found = |own| joint(&balance, &position, alone, &candidates, 2, own);
         assert_eq!(found(true), [7.0, 12.0]);
+        // What stands in the balance already is not found again.
+        let seventh =
+            [f64::cos, f64::sin].map(|of| position.iter().map(|x| of(7.0 * x)).collect::<Vec<f64>>());
+        let apart = |wave: &Vec<f64>, log: usize| -> Vec<f64> {
+            wave.iter().enumerate().map(|(i, w)| if i / ROWS == log { *w } else { 0.0 }).collect()
+        };
+        let columns: Vec<Vec<f64>> = seventh.iter().flat_map(|w| [apart(w, 0), apart(w, 1)]).collect();
+        let parameters = (0..columns.len()).map(|n| Parameter::amplitude(n.to_string(), 1.0)).collect();
+        let known = Alternative::columns("m1_ripple", parameters, columns);
+        let beside = Company { forms: &[&known], residual: &residual };
+        assert_eq!(joint(&balance, &position, beside, &candidates, 1, true), [12.0]);
         // In one phase, against the whole equations.
         let explained = |k: f64| {
             let scaled = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
