@@ -62,6 +62,15 @@ pub struct CleanLog {
     pub residual: Residual,
 }
 
+impl CleanLog {
+    /// Whether the drive goes from limit to limit: for a tenth of the time it asks for all of its torque.
+    #[must_use]
+    pub fn hunts(&self, rated_torque_nm: f64) -> bool {
+        let at_limit = |sample: &&Sample| sample.m2_torque_ref_nm.abs() > 0.99 * rated_torque_nm;
+        10 * self.samples.iter().filter(at_limit).count() > self.samples.len()
+    }
+}
+
 /// A rig with everything that decides its behaviour.
 #[derive(Debug, Clone)]
 pub struct World<'a> {

@@ -18,6 +18,9 @@ const SLIDING_TORQUE_NM: f64 = 5.4;
 /// Normal force above which no course goes.
 const GREATEST_NORMAL_N: f64 = 105.0;
 
+/// So many times the bandwidth of a speed loop that hunts is halved at most.
+const MOST_HALVINGS: i32 = 3;
+
 /// Generates a case.
 ///
 /// # Errors
@@ -95,13 +98,7 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
         holding_nm_per_n: 0.85 * plain.least() * rig.friction_radius_m,
         speed_rad_s: sizes.uniform(14.0, 19.0),
     };
-    let world = World {
-        rig: &rig,
-        friction: &friction,
-        baseline: &baseline,
-        laws: &laws,
-        bandwidth_rad_s: sizes.uniform(55.0, 85.0),
-    };
+    let bandwidth_rad_s = sizes.uniform(55.0, 85.0);
     let courses: Vec<Course> = match scenario.plan {
         Plan::Random | Plan::Drawn => (0..3)
             .map(|i| {
@@ -116,16 +113,21 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
     };
     let noise = Noise::draw(seed, scenario.noise_factor);
     let imperfections = Imperfections::draw(seed, scenario.imperfection, &noise, scenario.rate_hz);
-    let logs: Vec<CleanLog> = courses
-        .iter()
-        .enumerate()
-        .map(|(i, course)| {
+    let logs_at = |bandwidth_rad_s: f64| -> Vec<CleanLog> {
+        let world =
+            World { rig: &rig, friction: &friction, baseline: &baseline, laws: &laws, bandwidth_rad_s };
+        let log = |(i, course): (usize, &Course)| {
             let mut instants = Stream::new(seed, &format!("instants {i}"));
             let schedule = imperfections.schedule(scenario.rate_hz, course.duration_s, &mut instants);
             let disturbance = Disturbance::new(&imperfections, seed, i);
             world.run(course, &schedule, disturbance, &mut Stream::new(seed, &format!("log {i}")))
-        })
-        .collect();
+        };
+        courses.iter().enumerate().map(log).collect()
+    };
+    // A speed loop that hunts (a late drive on a soft shaft) is turned down before anything is logged.
+    let turned_down = (0..=MOST_HALVINGS).map(|halvings| logs_at(bandwidth_rad_s / 2f64.powi(halvings)));
+    let hunts = |logs: &Vec<CleanLog>| logs.iter().any(|log| log.hunts(rig.rated_torque_nm));
+    let logs = turned_down.skip_while(hunts).next().unwrap_or_else(|| logs_at(bandwidth_rad_s));
 
     let mut residuals: Vec<_> = logs.iter().map(|log| log.residual).collect();
     let samples: Vec<_> = logs.into_iter().map(|log| log.samples).collect();

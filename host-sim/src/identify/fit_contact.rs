@@ -9,7 +9,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::contact::log::ContactLog;
+use super::contact::log::{ContactLog, OBSERVED_OVER};
 use super::contact::problem::{Baseline, Fit, Problem, Role};
 use super::fit_interval::covariance;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
@@ -210,7 +210,8 @@ pub fn identify(
             .map(|(w, _)| w.abs())
             .filter(|w| *w > 0.0)
     });
-    let points = points(&baseline, &fit.p, &of_p, slid.collect());
+    let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
+    let points = points(&baseline, &fit.p, &of_p, slid.collect(), smoothing_s);
     let values = values(model, &baseline, &fit.p, free);
     let uncertain = match &points {
         Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),

@@ -20,8 +20,10 @@ use super::linear;
 const CURVE_FORM: f64 = 4e-4;
 /// … of the stiffness, …
 const STIFFNESS_FORM: f64 = 1e-3;
-/// … and of the damping, whose time constant the smoothing of the slip lengthens.
-const DAMPING_FORM: f64 = 5e-3;
+/// … and of the damping, over the square of the smoothing's width in the block's time constant c/k: a response of variance
+/// τ² behind a filter of variance σ² has that of a τ longer by ½ σ²/τ². The filter's own is 0 in its pass band and σ² at
+/// worst; half of that.
+const DAMPING_FORM: f64 = 0.25;
 /// Steps of the walk that find its width, and those that count.
 const STEPS: [usize; 3] = [4_000, 4_000, 40_000];
 /// Every so many steps a point is kept.
@@ -82,13 +84,15 @@ fn speeds(mut slid_m_s: Vec<f64>, count: usize) -> Option<Vec<f64>> {
     (low > 0.0 && high > low).then(|| (0..count).map(|j| low * (high / low).powf(share(j))).collect())
 }
 
-/// Points of the posterior of the baseline's values about its top `p`; `covariance` is that of the likelihood alone there.
+/// Points of the posterior of the baseline's values about its top `p`; `covariance` is that of the likelihood alone there, for
+/// a slip that is smoothed over this width.
 /// `None` where what is seen has no inverse, as in sliding at one speed.
 pub(super) fn points(
     baseline: &Baseline,
     p: &[f64],
     covariance: &DMatrix<f64>,
     slid_m_s: Vec<f64>,
+    smoothing_s: f64,
 ) -> Option<Vec<Vec<f64>>> {
     let n = p.len();
     let count = baseline.free.iter().filter(|base| Seen::is_curve(base.role)).count();
@@ -101,9 +105,11 @@ pub(super) fn points(
     }
     let mut of_seen = &g * covariance * g.transpose();
     let rest = baseline.free.iter().map(|base| base.role).filter(|role| !Seen::is_curve(*role));
+    let numbers = baseline.numbers(p);
+    let width = smoothing_s * numbers.stiffness_n_per_m / numbers.damping_n_s_per_m.max(f64::MIN_POSITIVE);
     let form = std::iter::repeat_n(CURVE_FORM, count).chain(rest.map(|role| match role {
         Role::Stiffness => STIFFNESS_FORM,
-        Role::Damping => DAMPING_FORM,
+        Role::Damping => (DAMPING_FORM * width * width).min(1.0),
         _ => 0.0,
     }));
     for (i, form) in form.enumerate() {
@@ -200,7 +206,7 @@ mod tests {
         };
         let of = |deviation: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
-            let points = points(&baseline, &p, &covariance, slid()).unwrap();
+            let points = points(&baseline, &p, &covariance, slid(), 0.0).unwrap();
             let mut v0: Vec<f64> = points.iter().map(|q| q[2] - p[2]).collect();
             (quantile(&mut v0, 0.025), quantile(&mut v0, 0.975))
         };

@@ -82,6 +82,21 @@ fn the_logs_of_a_case_run_different_courses_from_different_encoder_origins() {
 }
 
 #[test]
+fn a_speed_loop_that_hunts_is_turned_down() {
+    // A late drive on a soft shaft: with the bandwidth drawn the torque goes from limit to limit.
+    let scenario = Scenario {
+        duration_s: 4.0,
+        plan: Plan::Random,
+        ..Scenario::new(&[Effect::ShaftTorsion, Effect::DriveDelay], 101_013_014)
+    };
+    for log in logs(&generate(&scenario).unwrap()) {
+        let torque = log.column("m2_torque_ref_nm");
+        let at_limit = torque.iter().filter(|t| t.abs() > 7.9).count();
+        assert!(10 * at_limit <= torque.len(), "{at_limit} of {}", torque.len());
+    }
+}
+
+#[test]
 fn columns_are_complete_and_time_is_regular_at_every_rate() {
     for rate_hz in [200.0, 1000.0, 10_000.0] {
         let case = generate(&Scenario {
