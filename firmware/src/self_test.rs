@@ -8,7 +8,7 @@
 //! fails, as it should.
 
 use crate::board::{self, Board, LOOP_BACK_CHANNELS};
-use crate::{adc_scan, clocks, encoders, inputs, outputs, tick};
+use crate::{adc_scan, clock_check, clocks, encoders, inputs, outputs, tick};
 use cortex_m::asm::delay;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::Pupdr;
@@ -86,6 +86,20 @@ fn equal(what: &'static str, found: impl Into<i64>, expected: impl Into<i64>) ->
 /// It does not.
 pub fn crystal() -> Checked {
     equal("the core runs from the 8 MHz", clocks::crystal_is_used(), true)
+}
+
+/// The clock is what it is taken for, by the board's 32.768 kHz crystal: within the 1 % that the limits allow for.
+///
+/// # Errors
+/// It is not, or the crystal does not run.
+pub fn clock() -> Checked {
+    const MOST_PPM: u32 = 10_000;
+    let ppm = clock_check::deviation_ppm().map_err(|what| Failed { what, expected: 0, found: 0 })?;
+    defmt::info!("by the 32.768 kHz crystal the clock is {=i32} ppm fast", ppm);
+    if ppm.unsigned_abs() <= MOST_PPM {
+        return Ok(());
+    }
+    Err(Failed { what: "ppm that the clock is fast, 10 000 at most", expected: 0, found: ppm.into() })
 }
 
 /// Every model gives the bits it gave on the computer that built this.

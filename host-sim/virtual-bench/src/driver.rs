@@ -294,6 +294,7 @@ impl BenchDriver {
                 part.encoders[motor as usize].disturb(Disturbance { at: stop.at, width_ns });
             }
             Action::Reference(motor, wire) => self.outside.references[motor as usize] = wire,
+            Action::LowSpeedCrystal(hz) => part.fit_low_speed_crystal(hz),
             Action::AnalogSupply(millivolt) => part.set_analog_supply(millivolt),
             Action::AdcScanCut => part.adc1.cut_next_scan(),
             Action::SerialStreamsLockUp => {
@@ -665,6 +666,7 @@ impl Driver<RigBoard> for BenchDriver {
             self.drain_log(host);
         }
         let part = &mut session.board_mut().part;
+        part.run_low_speed_crystal(stop.at);
         self.show_outside(part, stop.at);
         self.note_outputs(part, stop.at);
         let wrong_reference = std::mem::take(&mut self.wrong_reference);

@@ -133,6 +133,8 @@ pub enum Action {
     LinkSilent(bool),
     /// So many bytes in a million reach the chip with a framing error and flipped bits.
     LinkGarbled(u32),
+    /// The board's 32 kHz crystal has this frequency, Hz; 0: it does not start.
+    LowSpeedCrystal(u64),
     /// The 3.3 V, of which every analogue code is a share, are these, in mV.
     AnalogSupply(u32),
     /// The chip's supply is cut or comes back. Memory other than flash is lost.

@@ -342,24 +342,63 @@ fn the_chip_tells_what_its_3_3_v_are_worth() {
     }
 }
 
-#[test]
-fn the_self_test_of_the_board_passes_with_the_shipped_start() {
+/// Runs the board's self-test until the log has a line with `last`: the log, whether the outputs are safe then, and how
+/// often it restarted.
+fn self_test(last: &str, crystal_hz: u64) -> (Vec<String>, bool, usize) {
     let elf = firmware_build::release_elf_of(firmware_build::SELF_TEST).unwrap();
     let program = Firmware::read(&elf).unwrap();
     let plant = Request::assumed("fig20").unwrap().plant().unwrap();
-    let outcome =
-        bench::run(&program, Box::new(plant), |endpoint| endpoint.wait_until(8_000_000_000)).unwrap();
-    let log = defmt_log::decode(&program.bytes, &outcome.record.log).unwrap();
-    let said = |name: &str| log.lines.iter().find(|line| line.contains(&format!("self-test: {name}")));
-    for name in ["clock", "models", "making safe", "loop-back", "ticks"] {
-        let line = said(name).unwrap_or_else(|| panic!("{name} was not reached: {:#?}", log.lines));
+    let mut lines = Vec::new();
+    let outcome = bench::run(&program, Box::new(plant), |endpoint| {
+        endpoint.act(Action::LowSpeedCrystal(crystal_hz))?;
+        let mut bytes = Vec::new();
+        while !lines.iter().any(|line: &String| line.contains(last)) && endpoint.now_ns() < 15_000_000_000 {
+            endpoint.wait_until(endpoint.now_ns() + 100_000_000)?;
+            bytes.extend(endpoint.take_log()?.concat());
+            lines = defmt_log::decode(&program.bytes, &[bytes.clone()])?.lines;
+        }
+        Ok(endpoint.outputs()?.is_safe())
+    })
+    .unwrap();
+    (lines, outcome.operator, outcome.record.restarts.len())
+}
+
+/// The bench's clock is exact, so a crystal that is off is a clock that is off the other way.
+#[test]
+fn the_self_test_tells_a_clock_that_is_wrong_and_a_crystal_that_does_not_run() {
+    for (crystal_hz, says) in [
+        (
+            33_200,
+            "self-test: clock: FAILED: Failed { what: \"ppm that the clock is fast, 10 000 at most\", expected: 0, found: -130",
+        ),
+        (
+            32_400,
+            "self-test: clock: FAILED: Failed { what: \"ppm that the clock is fast, 10 000 at most\", expected: 0, found: 113",
+        ),
+        (32_500, "self-test: clock: ok"),
+        (0, "self-test: clock: FAILED: Failed { what: \"the 32.768 kHz crystal does not start\""),
+    ] {
+        let (lines, ..) = self_test("self-test: clock", crystal_hz);
+        assert!(lines.iter().any(|line| line.contains(says)), "{crystal_hz} Hz: {lines:#?}");
+    }
+}
+
+#[test]
+fn the_self_test_of_the_board_passes_with_the_shipped_start() {
+    let (lines, safe, restarts) = self_test("self-test: done", 32_768);
+    let said = |name: &str| lines.iter().find(|line| line.contains(&format!("self-test: {name}")));
+    assert!(
+        lines.iter().any(|line| line.contains("by the 32.768 kHz crystal the clock is 0 ppm fast")),
+        "{lines:#?}"
+    );
+    for name in ["8 MHz", "clock", "models", "making safe", "loop-back", "ticks"] {
+        let line = said(name).unwrap_or_else(|| panic!("{name} was not reached: {lines:#?}"));
         assert!(line.ends_with("ok"), "{line}");
     }
     // The bench has wires where the board must have none, and no pull resistors that move a timer's input.
     for (name, why) in [("inputs", "reads as"), ("encoders", "counts of M1")] {
         assert!(said(name).unwrap().contains(why), "{:?}", said(name));
     }
-    assert!(said("done, 2 failed").is_some(), "{:#?}", log.lines);
-    assert!(outcome.record.restarts.is_empty());
-    assert!(outcome.record.outputs.last().unwrap().1.is_safe());
+    assert!(said("done, 2 failed").is_some(), "{lines:#?}");
+    assert_eq!((safe, restarts), (true, 0));
 }
