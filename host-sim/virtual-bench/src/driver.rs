@@ -647,6 +647,7 @@ impl Driver<RigBoard> for BenchDriver {
                         session.board_mut().part.fail_crystal(hit.at);
                     }
                     self.lookout.arrived(hit.address, hit.at.0);
+                    self.record.arrivals.push(hit.at.0);
                 }
                 self.meter.handler_entered(Moment { instructions: hit.instruction_count, nanos: hit.at.0 });
             }

@@ -23,8 +23,10 @@ pub(crate) const STUB: u64 = 0xFF00;
 pub(crate) const MASKED_AT: u64 = STUB + 2 * 12;
 /// `TIMx_CNT`.
 const COUNTER: u64 = 0x24;
-/// Nanoseconds of one round of the stub's loop: two instructions.
-const ROUND_NS: u64 = 2 * 1_000_000_000 / crate::board::INSTRUCTIONS_PER_SECOND.get();
+/// Rounds of the stub's loop, two instructions each, in this time.
+const fn rounds(ns: u64) -> u64 {
+    ns * crate::board::INSTRUCTIONS_PER_SECOND.get() / 2_000_000_000
+}
 
 /// A word that code in ITCM may write, as the firmware does not: `S3M1AR` of DMA1, whose stream 3 it leaves alone.
 const SPARE_REGISTER: u64 = DMA1.base + 0x68;
@@ -140,7 +142,7 @@ pub(crate) fn masking_stub(host: &mut dyn Host, original: u64, from_ns: u64, for
         0xBF00, // nop
     ];
     let target = from_ns * 240 / 1000;
-    let words = [SPARE_REGISTER, TIM6.base + COUNTER, target, (for_ns / ROUND_NS).max(1), original | 1];
+    let words = [SPARE_REGISTER, TIM6.base + COUNTER, target, rounds(for_ns).max(1), original | 1];
     put(host, STUB, &code, &words)
 }
 
