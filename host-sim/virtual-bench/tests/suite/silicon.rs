@@ -415,6 +415,8 @@ fn the_self_test_tells_a_clock_that_is_wrong_and_a_crystal_that_does_not_run() {
     }
 }
 
+/// Red on the self-test with the `adc_scan::convert_once` of 95e288c, which writes the converter's registers under ADSTART: the
+/// bench refuses that.
 #[test]
 fn the_self_test_of_the_board_passes_with_the_shipped_start() {
     let (lines, safe, restarts) = self_test("self-test: done", 32_768);
