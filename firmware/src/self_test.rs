@@ -126,7 +126,8 @@ pub fn loop_back() -> Checked {
     const MOST: i64 = 655;
     for codes in [[DAC_ZERO; 2], [1024, 3072], [3072, 1024], [0, 4095], [4095, 0]] {
         outputs::write_references(codes);
-        // The 15 kΩ that the DAC is taken to have without its buffer, into the pin's 10 nF and the wire: ten time constants of 160 µs.
+        // At most 16 kΩ of the DAC without its buffer (`outputs.rs`) into 10 nF, should somebody have put them at the pin:
+        // ten time constants of 160 µs.
         delay(768_000);
         for (code, channel) in codes.into_iter().zip(LOOP_BACK_CHANNELS) {
             let sent = i64::from(code) * 16;
