@@ -79,6 +79,8 @@ pub struct FaultCase {
     /// The host meanwhile.
     pub host: Host,
     expect: fn(State) -> Expect,
+    /// Its cause stands for so long after it was put right, ns.
+    pub lasts_ns: u64,
     /// Stands for bits of memory, which are drawn.
     pub is_flip: bool,
 }
@@ -120,6 +122,7 @@ fn case(
         sighting,
         host: Host::Lively,
         expect,
+        lasts_ns: 0,
         is_flip: false,
     }
 }
@@ -439,6 +442,15 @@ fn chip() -> Vec<FaultCase> {
         case("bus error in the control tick", &[Action::BusError], Sighting::Code, trap),
         case("the 8 MHz fail", &[Action::ClockFails], Sighting::Code, trap),
         case("interrupts masked over the end of a period", &[MASK], Sighting::Code, |_| Expect::Bears),
+        FaultCase {
+            lasts_ns: LEAK_NS,
+            ..case(
+                "ticks that are not a period apart",
+                &[IRREGULAR],
+                Sighting::Code,
+                latches!(IRREGULAR_NS, TickIrregular),
+            )
+        },
         case("reset pin pulled", &[Action::ResetPin], Sighting::Restart, |_| {
             Expect::Restarts(ResetCause::Pin, None, 0)
         }),
@@ -454,6 +466,13 @@ fn chip() -> Vec<FaultCase> {
 }
 
 const MASK: Action = Action::MaskInterrupts { times: 5, from_ns: 98_000, for_ns: 10_000 };
+
+/// Each makes a tick 40 µs late: the distance to the tick before is too long and to the next too short. Five are forgiven.
+const IRREGULAR: Action = Action::MaskInterrupts { times: 6, from_ns: 3_500, for_ns: 40_000 };
+/// The third comes so long after the first, as the link's interrupt comes with each row of telemetry.
+const IRREGULAR_NS: u64 = 3_000_000;
+/// Of the ticks that were counted one is forgotten a second.
+const LEAK_NS: u64 = 1_000_000_000;
 
 /// A request that the rig must refuse, or that changes nothing, in this state.
 #[must_use]

@@ -276,6 +276,42 @@ fn a_tick_that_is_late_by_microseconds_is_no_jump_of_the_encoder() {
     assert!(speed > 31.0, "{speed} rad/s");
 }
 
+/// The supervisor's budget of ticks at another distance than a period, which is that of late ticks.
+const FORGIVEN: usize = 5;
+
+/// Red with `tick_irregular: false` in the tick: it goes on.
+#[test]
+fn ticks_that_are_not_a_period_apart_are_a_fault_once_there_are_too_many() {
+    const PERIOD_NS: u64 = 100_000;
+    for state in [State::Armed, State::Sliding] {
+        let outcome = from(state, |endpoint, listener| {
+            listener.listen(endpoint, endpoint.now_ns() + 5_000_000)?;
+            // The tick comes at 44 µs in place of 5: 139 µs after the one before, and 61 before the next.
+            endpoint.act(Action::MaskInterrupts { times: 6, from_ns: 3_500, for_ns: 40_000 })?;
+            health(endpoint, listener)
+        });
+        let arrivals = &outcome.record.arrivals;
+        let periods: Vec<u64> =
+            arrivals.iter().map(|at| (at - arrivals[0] + PERIOD_NS / 2) / PERIOD_NS).collect();
+        let late = |period: &u64| periods.contains(period);
+        // Those whose distance to the one before is none of a period: late after in time, or in time after late.
+        let irregular: Vec<u64> =
+            (0..10_000).filter(|period| late(period) != (*period > 0 && late(&(period - 1)))).collect();
+        // The tick that finds it begins 5 µs into its period, at the latest 44.
+        let known = arrivals[0] + irregular[FORGIVEN] * PERIOD_NS;
+        assert_eq!(Fault::from_number(outcome.operator.fault), Some(Fault::TickIrregular), "{state:?}");
+        let safe = outcome.record.safe_for_good_from(arrivals[0]).unwrap();
+        println!(
+            "{state:?}: masked in periods {periods:?}, safe {} ns after it was known",
+            safe as i64 - known as i64
+        );
+        assert!(
+            safe >= known && safe < known + 2 * PERIOD_NS,
+            "{state:?}: safe at {safe}, known at {known}, {periods:?}"
+        );
+    }
+}
+
 #[test]
 fn pulses_coupled_into_the_encoders_lines_do_not_count() {
     for state in [State::Armed, State::Sliding] {
