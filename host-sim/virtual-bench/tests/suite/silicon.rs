@@ -5,6 +5,7 @@ use host_sim::files::experiment_file::ExperimentFile;
 use model_core::control::{Fault, Mode};
 use object::{Object, ObjectSymbol};
 use rig_link::message::{Answer, Command, Rejection};
+use rig_link::model::ModelRecord;
 use rig_link::telemetry::{BINS, Health, StartHistogram};
 use std::sync::OnceLock;
 use virtual_bench::bench::{self, Outcome};
@@ -232,17 +233,28 @@ fn a_host_that_falls_silent_disarms_the_rig() {
 #[test]
 fn a_model_is_stored_only_while_the_drives_are_off() {
     for state in [State::Armed, State::Sliding] {
-        let (answer, after) = from(state, |endpoint, listener| {
-            let answer = listener.ask(endpoint, &Command::ModelForget)?;
-            Ok((answer, health(endpoint, listener)?))
+        let (answers, after) = from(state, |endpoint, listener| {
+            let answers = [
+                listener.ask(endpoint, &Command::ModelSet(ModelRecord::default()))?,
+                listener.ask(endpoint, &Command::ModelForget)?,
+            ];
+            Ok((answers, health(endpoint, listener)?))
         })
         .operator;
-        assert_eq!(answer, Answer::Rejected(Rejection::NotDisabled), "{state:?}");
+        let rejected = || Answer::Rejected(Rejection::NotDisabled);
+        assert_eq!(answers, [rejected(), rejected()], "{state:?}");
         assert_eq!(after.fault, 0, "{state:?}");
     }
-    let answer =
-        from(State::Idle, |endpoint, listener| listener.ask(endpoint, &Command::ModelForget)).operator;
-    assert_eq!(answer, Answer::Model(None));
+    let (set, read, forgotten) = from(State::Idle, |endpoint, listener| {
+        Ok((
+            listener.ask(endpoint, &Command::ModelSet(ModelRecord::default()))?,
+            listener.ask(endpoint, &Command::ModelGet)?,
+            listener.ask(endpoint, &Command::ModelForget)?,
+        ))
+    })
+    .operator;
+    let stored = || Answer::Model(Some(ModelRecord::default()));
+    assert_eq!((set, read, forgotten), (stored(), stored(), Answer::Model(None)));
 }
 
 #[test]
