@@ -341,6 +341,7 @@ impl BenchDriver {
                     }
                 }
             }
+            Action::ReceiverLocked(locked) => interference::lock_receiver(part, stop.at, locked),
             Action::ClockFails => {
                 self.crystal_fails = true;
                 self.obstruct(TICK_LINE, Obstacle::ClockFailure, host);

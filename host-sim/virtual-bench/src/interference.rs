@@ -100,6 +100,12 @@ pub(crate) fn lock_up_serial_streams(part: &mut Part, at: VirtualNanos) -> bool 
     locked
 }
 
+/// Takes the receiver's request from its stream or gives it back: `EN` stands and the counter stays, as in a lock-up.
+pub(crate) fn lock_receiver(part: &mut Part, at: VirtualNanos, locked: bool) {
+    // DMAMUX1's channel 1 is that of DMA1 stream 1 (firmware/src/link/ring.rs).
+    write(part, at, DMAMUX1.base + 4, if locked { 0 } else { USART3_REQUESTS[0] });
+}
+
 /// A register; 0 where nothing answers.
 pub(crate) fn read(part: &mut Part, at: VirtualNanos, address: u64) -> u64 {
     Operate::read(part, at, address, Width::W32).unwrap_or_default()

@@ -120,6 +120,8 @@ pub enum Action {
     AdcScanCut,
     /// The serial port's DMA streams lock up where the errata sheet's condition for it holds.
     SerialStreamsLockUp,
+    /// The serial port's receiving stream serves no request any more, whatever locked it up, or does again.
+    ReceiverLocked(bool),
     /// The next so many times the link's interrupt comes, all interrupts are masked.
     MaskInterrupts {
         /// How often.
