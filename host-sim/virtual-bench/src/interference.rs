@@ -34,15 +34,15 @@ const SPARE_REGISTER: u64 = DMA1.base + 0x68;
 /// An address where nothing answers.
 pub(crate) const NOTHING: u64 = 0xA000_0000;
 /// `ICSR` of the core, and the bit that pends the non-maskable interrupt (ARMv7-M B3.2.4).
-const ICSR: u64 = 0xE000_ED04;
-const NMI_PENDS: u64 = 1 << 31;
+pub(crate) const ICSR: u64 = 0xE000_ED04;
+pub(crate) const NMI_PENDS: u64 = 1 << 31;
 
 /// Pends another exception, and goes on to the handler:
 /// ldr r0, register; ldr r1, pends; str r1, [r0]; dsb; ldr r0, original; bx r0; nop
 const PEND: [u16; 8] = [0x4803, 0x4904, 0x6001, 0xF3BF, 0x8F4F, 0x4803, 0x4700, 0xBF00];
 /// `NVIC_ISPR0`, and the bit of the voltage detector (ARMv7-M B3.4.5, RM0433 table 147).
-const ISPR0: u64 = 0xE000_E200;
-const PVD_PENDS: u64 = 1 << 1;
+pub(crate) const ISPR0: u64 = 0xE000_E200;
+pub(crate) const PVD_PENDS: u64 = 1 << 1;
 
 /// What stands before a handler in place of [`masking_stub`].
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -163,6 +163,9 @@ pub enum Action {
     ReadMap,
     /// From now on the stack below each interrupt's handler is painted and measured (`probe.rs`).
     MeasureStack,
+    /// The stack below the control tick is painted, and the chip crashes there: how deep that goes is read before it starts
+    /// again (`probe.rs`).
+    MeasureCrash(Crash),
     /// The 8 MHz stop, and the clock security system notices.
     ClockFails,
     /// The chip's supply falls, and the voltage detector notices.
@@ -174,6 +177,22 @@ pub enum Action {
         /// The bit.
         bit: u8,
     },
+}
+
+/// What ends the firmware with a crash record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Crash {
+    /// The voltage detector's interrupt.
+    Supply,
+    /// A trap.
+    HardFault,
+    /// The non-maskable interrupt: the clock fails.
+    Nmi,
+}
+
+impl Crash {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Supply, Self::HardFault, Self::Nmi];
 }
 
 /// The ±10 V wire from the amplifier to a drive.
