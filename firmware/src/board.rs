@@ -8,9 +8,12 @@
 //! | TIM2 | encoder of M2, 32 bit |
 //! | TIM3 | time of the executor |
 //! | TIM4 | encoder of M1, 16 bit |
-//! | TIM6 | control period; its trigger output starts the scan |
+//! | TIM6 | control period; its trigger output starts the scan, its update latches M2's counter |
+//! | TIM7 | in step with TIM6: its update latches M1's counter |
+//! | TIM16 | in the board's self-test: times the 32.768 kHz crystal |
 //! | ADC3 | the internal reference, once at the start |
 //! | ADC1, DMA1 stream 7 | scan of five channels; the end of the transfer starts the tick |
+//! | DMA1 streams 5 and 6 | the latched counters of M1 and M2 |
 //! | DAC1 | torque references |
 //! | USART3, DMA1 streams 0 and 1 | link |
 

@@ -10,9 +10,11 @@
 //! | PLL2 P | 8 / 2 · 100 / 8 = 50 MHz | ADC kernel, halved in the converter: 25 MHz, limit at 16 bit is 36 |
 //! | USART3 | 120 MHz / 60 | exactly 2 Mbaud |
 //!
-//! Without the 8 MHz the internal oscillator takes its place (64 / 16 · 240 / 2), within 1 %: the rig then
-//! still answers, says so, and its times and speeds are off by as much. When the crystal fails later, the
-//! clock security system traps, and the trap makes safe.
+//! Without the 8 MHz the internal oscillator takes their place (64 / 16 · 240 / 2), off by some 1 % with temperature
+//! (DS12110 rev 11, table 134): the rig then still answers, and says so. When the 8 MHz fail later, the clock security
+//! system traps, and the trap makes safe. That they are there says nothing of what they are worth: they are the
+//! ST-LINK's, by its crystal or by its RC oscillator. `clock_check.rs` measures it on the board, `rig commission` by the
+//! computer's clock.
 
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
@@ -25,7 +27,7 @@ use embassy_stm32::{Config, Peripherals, pac};
 
 /// Rate of the core and of its cycle counter.
 pub const CORE_HZ: u32 = 480_000_000;
-/// Reads of the ready flag before the crystal counts as missing: some 20 ms at the 64 MHz of the start.
+/// Reads of the ready flag before the 8 MHz count as missing: some 20 ms at the 64 MHz of the start.
 const PATIENCE: u32 = 200_000;
 
 /// Whether the 8 MHz from the ST-LINK are there. To be asked before the clock tree is set up.
@@ -93,7 +95,7 @@ fn config(crystal: bool) -> Config {
     config
 }
 
-/// Whether the core runs from the crystal.
+/// Whether the core runs from the 8 MHz of the ST-LINK.
 #[must_use]
 pub fn crystal_is_used() -> bool {
     pac::RCC.pllckselr().read().pllsrc() == PllSource::HSE
@@ -106,7 +108,7 @@ pub fn yield_to_the_tick() {
     }
 }
 
-/// Turns the clock security system on: a crystal that fails traps (NMI) instead of slowing the loop.
+/// Turns the clock security system on: 8 MHz that fail trap (NMI) instead of slowing the loop.
 pub fn watch_crystal() {
     pac::RCC.cr().modify(|w| w.set_hsecsson(true));
 }

@@ -7,6 +7,7 @@
 pub mod adc_scan;
 pub mod board;
 pub mod capture;
+pub mod clock_check;
 pub mod clocks;
 pub mod crash_record;
 pub mod encoders;

@@ -4,9 +4,8 @@
 //! would mean full negative torque.
 //!
 //! The output buffers are off: buffered, the outputs end 0.2 V before either rail (DS12110, DAC characteristics), at
-//! 88 % of the rated torque. Without them the output resistance is that of the converter's network, taken as 15 kΩ here (assumed: look it up in DS12110 before an
-//! amplifier is chosen), so the amplifier behind must draw next to
-//! nothing (`PINS.md`).
+//! 88 % of the rated torque. Without them the output resistance is that of the converter's network, 10.3 to 16 kΩ (RO, buffer
+//! off, same table), so the amplifier behind must draw next to nothing (`PINS.md`).
 
 use crate::board::{M1_ENABLE, M2_ENABLE};
 use embassy_stm32::pac::dac::vals::Mode;

@@ -8,7 +8,7 @@
 //! fails, as it should.
 
 use crate::board::{self, Board, LOOP_BACK_CHANNELS};
-use crate::{adc_scan, clocks, encoders, inputs, outputs, tick};
+use crate::{adc_scan, clock_check, clocks, encoders, inputs, outputs, tick};
 use cortex_m::asm::delay;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::Pupdr;
@@ -88,6 +88,20 @@ pub fn crystal() -> Checked {
     equal("the core runs from the 8 MHz", clocks::crystal_is_used(), true)
 }
 
+/// The clock is what it is taken for, by the board's 32.768 kHz crystal: within the 1 % that the limits allow for.
+///
+/// # Errors
+/// It is not, or the crystal does not run.
+pub fn clock() -> Checked {
+    const MOST_PPM: u32 = 10_000;
+    let ppm = clock_check::deviation_ppm().map_err(|what| Failed { what, expected: 0, found: 0 })?;
+    defmt::info!("by the 32.768 kHz crystal the clock is {=i32} ppm fast", ppm);
+    if ppm.unsigned_abs() <= MOST_PPM {
+        return Ok(());
+    }
+    Err(Failed { what: "ppm that the clock is fast, 10 000 at most", expected: 0, found: ppm.into() })
+}
+
 /// Every model gives the bits it gave on the computer that built this.
 ///
 /// # Errors
@@ -112,7 +126,8 @@ pub fn loop_back() -> Checked {
     const MOST: i64 = 655;
     for codes in [[DAC_ZERO; 2], [1024, 3072], [3072, 1024], [0, 4095], [4095, 0]] {
         outputs::write_references(codes);
-        // The 15 kΩ that the DAC is taken to have without its buffer, into the pin's 10 nF and the wire: ten time constants of 160 µs.
+        // At most 16 kΩ of the DAC without its buffer (`outputs.rs`) into 10 nF, should somebody have put them at the pin:
+        // ten time constants of 160 µs.
         delay(768_000);
         for (code, channel) in codes.into_iter().zip(LOOP_BACK_CHANNELS) {
             let sent = i64::from(code) * 16;

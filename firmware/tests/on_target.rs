@@ -31,6 +31,13 @@ mod tests {
         passed(self_test::crystal());
     }
 
+    // The crystal may take 4 s to start.
+    #[test]
+    #[timeout(15)]
+    fn the_clock_is_within_1_percent_by_the_32_khz_crystal() {
+        passed(self_test::clock());
+    }
+
     #[test]
     fn every_model_gives_the_bits_it_gave_on_the_computer() {
         passed(self_test::models());

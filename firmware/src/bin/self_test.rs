@@ -19,8 +19,9 @@ type Check = (&'static str, fn() -> Checked);
 fn main() -> ! {
     let Started { board, .. } = start::start();
     self_test::prepare(board);
-    let checks: [Check; 7] = [
-        ("clock", self_test::crystal),
+    let checks: [Check; 8] = [
+        ("8 MHz", self_test::crystal),
+        ("clock", self_test::clock),
         ("models", self_test::models),
         ("inputs", self_test::inputs),
         ("making safe", self_test::making_safe),

@@ -31,7 +31,7 @@ const TICK_PATIENCE: Duration = Duration::from_millis(20);
 pub struct Identity {
     /// Why the chip started.
     pub reset: ResetCause,
-    /// The clock comes from the crystal.
+    /// The clock comes from the 8 MHz of the ST-LINK.
     pub crystal: bool,
     /// VREF+ at the start, mV.
     pub reference_mv: u16,

@@ -23,13 +23,13 @@ pub(super) fn step(c: &mut Commissioning<'_, '_>) -> Result<(), Stop> {
     }
     c.rig.open()?;
     c.check("firmware", words::hello(&hello), "protocol and settings of this tool", true, "");
-    let clock = if hello.crystal { "crystal" } else { "internal oscillator" };
+    let clock = if hello.crystal { "the 8 MHz of the ST-LINK" } else { "internal oscillator" };
     c.check(
         "clock",
         clock,
-        "crystal",
+        "the 8 MHz of the ST-LINK",
         hello.crystal,
-        "times and speeds may be off by 1 %: look at the board's crystal",
+        "times and speeds may be off by 1 %: the 8 MHz of the ST-LINK are missing",
     );
     let [least, most] = [REFERENCE_MV.start(), REFERENCE_MV.end()].map(|mv| in_volts(*mv));
     c.check(

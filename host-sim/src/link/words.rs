@@ -97,7 +97,11 @@ pub fn hello(hello: &Hello) -> String {
         ResetCause::Watchdog => "the watchdog",
         ResetCause::Other => "an unknown reset",
     };
-    let clock = if hello.crystal { "" } else { "; without its crystal: times and speeds may be off by 1 %" };
+    let clock = if hello.crystal {
+        ""
+    } else {
+        "; without the 8 MHz of the ST-LINK: times and speeds may be off by 1 %"
+    };
     let reference = if REFERENCE_MV.contains(&hello.reference_mv) {
         String::new()
     } else {

@@ -2,15 +2,19 @@
 //!
 //! Instructions on the emulated core are exact and the same on every computer with the same compiler. So the record,
 //! `budget.toml`, is compared with little room: a tick that costs 2 % more than recorded fails the suite until the
-//! record is made again, in the same change as what made the tick dearer.
+//! record is made again, in the same change as what made the tick dearer. The same for the stack's worst case, which `cargo
+//! verify` prints beside the ELF's size.
 
 use crate::elf::Firmware;
 use crate::error::BenchError;
 use crate::experiment::{self, Request};
 use crate::firmware_build::root;
 use crate::meter::Ticks;
+use crate::soak::{self, Soaked};
+use crate::stack::{Depth, STACK};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::PathBuf;
 
 /// The experiments on the record; the last one has a 20-bristle patch in the observer.
@@ -35,6 +39,12 @@ pub struct Cost {
     pub max: u64,
 }
 
+impl fmt::Display for Cost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "mean {:>7.1}  max {:>5}", self.mean, self.max)
+    }
+}
+
 impl Cost {
     /// Of these ticks; the mean to a tenth.
     #[must_use]
@@ -47,6 +57,23 @@ impl Cost {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Budget {
     experiments: BTreeMap<String, Cost>,
+    stack: StackRecord,
+}
+
+/// The stack's worst case on the record, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+struct StackRecord {
+    worst: u64,
+    size: u64,
+    depth: Depth,
+}
+
+/// The soak in which the stack is measured for the record: the suite's.
+///
+/// # Errors
+/// As [`soak::soak`].
+pub fn recorded_soak(firmware: &Firmware) -> Result<Soaked, BenchError> {
+    soak::soak(firmware, 20.0, 3, &mut |_| ())
 }
 
 impl Budget {
@@ -72,7 +99,10 @@ impl Budget {
     ///
     /// # Errors
     /// A run failed, a tick costs more than any may, or the file cannot be written.
-    pub fn write(firmware: &Firmware, tell: &mut dyn FnMut(&str, &Cost)) -> Result<(), BenchError> {
+    pub fn write(
+        firmware: &Firmware,
+        tell: &mut dyn FnMut(&str, &dyn fmt::Display),
+    ) -> Result<(), BenchError> {
         let mut budget = Self::default();
         for name in RECORDED {
             let cost = Cost::of(&experiment::run(firmware, &request(name)?, |_, _| ())?.ticks);
@@ -80,10 +110,30 @@ impl Budget {
             tell(name, &cost);
             budget.experiments.insert(name.to_owned(), cost);
         }
+        let depth = recorded_soak(firmware)?.stack;
+        tell("stack", &depth);
+        budget.stack = StackRecord { worst: depth.worst(), size: STACK.end - STACK.start, depth };
         let failed = |error: String| BenchError::Check(format!("the record cannot be written: {error}"));
         let table = toml::to_string(&budget).map_err(|error| failed(error.to_string()))?;
-        let text = format!("# Instructions of a control tick. Made by: {REMAKE}\n\n{table}");
+        let text =
+            format!("# Instructions of a control tick, and bytes of the stack. Made by: {REMAKE}\n\n{table}");
         std::fs::write(Self::path(), text).map_err(|error| failed(error.to_string()))
+    }
+
+    /// Whether the stack goes as deep as is on the record.
+    ///
+    /// # Errors
+    /// It goes deeper, and what to do.
+    pub fn check_stack(&self, depth: &Depth) -> Result<(), BenchError> {
+        if depth.worst() <= self.stack.worst {
+            return Ok(());
+        }
+        Err(BenchError::Check(format!(
+            "{depth}: {} bytes at worst, on the record are {}; if it must be so, make the record again in the same change: \
+             {REMAKE}",
+            depth.worst(),
+            self.stack.worst
+        )))
     }
 
     /// Whether a run's ticks cost what is on the record.
@@ -133,7 +183,7 @@ mod tests {
     #[test]
     fn a_tick_may_cost_two_per_cent_more_than_recorded_and_no_more() {
         let recorded = Cost { mean: 3000.0, max: 5000 };
-        let budget = Budget { experiments: [("fig18".to_owned(), recorded)].into() };
+        let budget = Budget { experiments: [("fig18".to_owned(), recorded)].into(), ..Budget::default() };
         let check = |mean, max| budget.check("fig18", &Cost { mean, max });
         assert!(check(3060.0, 5100).is_ok());
         assert!(check(2000.0, 3000).is_ok());
@@ -145,9 +195,19 @@ mod tests {
     }
 
     #[test]
+    fn a_stack_that_goes_deeper_than_recorded_is_refused() {
+        let depth = Depth { mark: 30_000, tick: 4_000, drivers: 400, crash: 2_000 };
+        let stack = StackRecord { worst: depth.worst(), size: 57_344, depth };
+        let budget = Budget { stack, ..Budget::default() };
+        assert!(budget.check_stack(&depth).is_ok());
+        let refused = budget.check_stack(&Depth { crash: 2_004, ..depth }).unwrap_err().to_string();
+        assert!(refused.contains(REMAKE), "{refused}");
+    }
+
+    #[test]
     fn no_record_allows_more_than_the_limits() {
         let dear = Cost { mean: MOST_MEAN + 0.1, max: MOST_MAX };
-        let budget = Budget { experiments: [("fig18".to_owned(), dear)].into() };
+        let budget = Budget { experiments: [("fig18".to_owned(), dear)].into(), ..Budget::default() };
         assert!(budget.check("fig18", &dear).is_err());
         assert!(budget.check("fig18", &Cost { mean: 1000.0, max: MOST_MAX + 1 }).is_err());
     }

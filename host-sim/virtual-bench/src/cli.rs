@@ -78,7 +78,7 @@ struct Cli {
     /// Run experiments and commands drawn by a seed for so many seconds of the bench's time, and see that nothing is lost
     #[arg(long, value_name = "S", group = "what")]
     soak: Option<f64>,
-    /// Run all experiments and record anew what a control tick costs (budget.toml)
+    /// Run all experiments and a soak, and record anew what a control tick costs and how deep the stack goes (budget.toml)
     #[arg(long, group = "what")]
     write_budget: bool,
     /// Be a board: offer the serial link as a pseudo-terminal, until q or Ctrl-C
@@ -179,7 +179,7 @@ fn run(cli: Cli) -> Result<(), BenchError> {
     }
     if cli.write_budget {
         return Budget::write(&firmware(cli.elf)?, &mut |name, cost| {
-            say(&format!("{name:<12} mean {:>7.1}  max {:>5}", cost.mean, cost.max));
+            say(&format!("{name:<12} {cost}"));
         });
     }
     if cli.serve {

@@ -93,6 +93,8 @@ pub(crate) struct BenchDriver {
     patched: Vec<(u64, Width, u64)>,
     /// Code that a fault put in the core's way.
     in_the_way: Option<u64>,
+    /// The stack is painted for a crash to come (`probe.rs`).
+    crash_painted: bool,
     /// The crystal fails as the core arrives there: the same code asks for the interrupt that the failure is.
     crystal_fails: bool,
     lookout: Lookout,
@@ -145,6 +147,7 @@ impl BenchDriver {
             resets_seen: 0,
             patched: Vec::new(),
             in_the_way: None,
+            crash_painted: false,
             crystal_fails: false,
             lookout: Lookout::default(),
             deviations: Deviations::default(),
@@ -294,6 +297,7 @@ impl BenchDriver {
                 part.encoders[motor as usize].disturb(Disturbance { at: stop.at, width_ns });
             }
             Action::Reference(motor, wire) => self.outside.references[motor as usize] = wire,
+            Action::LowSpeedCrystal(hz) => part.fit_low_speed_crystal(hz),
             Action::AnalogSupply(millivolt) => part.set_analog_supply(millivolt),
             Action::AdcScanCut => part.adc1.cut_next_scan(),
             Action::SerialStreamsLockUp => {
@@ -340,6 +344,15 @@ impl BenchDriver {
                     }
                 }
             }
+            Action::MeasureCrash(crash) => {
+                let vector = interference::vector(TICK_LINE);
+                if let Ok(original) = host.read(vector, Width::W32) {
+                    let meter = probe::crash_meter(host, crash, original);
+                    self.program(vector, Width::W32, meter, host);
+                    self.crash_painted = true;
+                }
+            }
+            Action::ReceiverLocked(locked) => interference::lock_receiver(part, stop.at, locked),
             Action::ClockFails => {
                 self.crystal_fails = true;
                 self.obstruct(TICK_LINE, Obstacle::ClockFailure, host);
@@ -423,6 +436,9 @@ impl BenchDriver {
     fn restarted(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, at: VirtualNanos) {
         let new = session.resets().get(self.resets_seen..).unwrap_or_default().to_vec();
         self.resets_seen = session.resets().len();
+        if std::mem::take(&mut self.crash_painted) {
+            self.record.crash_depths.push(probe::crash_depth(host));
+        }
         let powered_on = new.iter().any(|reset| reset.cause == ResetCause::PowerOn);
         if !powered_on {
             self.drain_log(host);
@@ -646,6 +662,7 @@ impl Driver<RigBoard> for BenchDriver {
                         session.board_mut().part.fail_crystal(hit.at);
                     }
                     self.lookout.arrived(hit.address, hit.at.0);
+                    self.record.arrivals.push(hit.at.0);
                 }
                 self.meter.handler_entered(Moment { instructions: hit.instruction_count, nanos: hit.at.0 });
             }
@@ -665,6 +682,7 @@ impl Driver<RigBoard> for BenchDriver {
             self.drain_log(host);
         }
         let part = &mut session.board_mut().part;
+        part.run_low_speed_crystal(stop.at);
         self.show_outside(part, stop.at);
         self.note_outputs(part, stop.at);
         let wrong_reference = std::mem::take(&mut self.wrong_reference);

@@ -23,8 +23,10 @@ pub(crate) const STUB: u64 = 0xFF00;
 pub(crate) const MASKED_AT: u64 = STUB + 2 * 12;
 /// `TIMx_CNT`.
 const COUNTER: u64 = 0x24;
-/// Nanoseconds of one round of the stub's loop: two instructions.
-const ROUND_NS: u64 = 2 * 1_000_000_000 / crate::board::INSTRUCTIONS_PER_SECOND.get();
+/// Rounds of the stub's loop, two instructions each, in this time.
+const fn rounds(ns: u64) -> u64 {
+    ns * crate::board::INSTRUCTIONS_PER_SECOND.get() / 2_000_000_000
+}
 
 /// A word that code in ITCM may write, as the firmware does not: `S3M1AR` of DMA1, whose stream 3 it leaves alone.
 const SPARE_REGISTER: u64 = DMA1.base + 0x68;
@@ -32,15 +34,15 @@ const SPARE_REGISTER: u64 = DMA1.base + 0x68;
 /// An address where nothing answers.
 pub(crate) const NOTHING: u64 = 0xA000_0000;
 /// `ICSR` of the core, and the bit that pends the non-maskable interrupt (ARMv7-M B3.2.4).
-const ICSR: u64 = 0xE000_ED04;
-const NMI_PENDS: u64 = 1 << 31;
+pub(crate) const ICSR: u64 = 0xE000_ED04;
+pub(crate) const NMI_PENDS: u64 = 1 << 31;
 
 /// Pends another exception, and goes on to the handler:
 /// ldr r0, register; ldr r1, pends; str r1, [r0]; dsb; ldr r0, original; bx r0; nop
 const PEND: [u16; 8] = [0x4803, 0x4904, 0x6001, 0xF3BF, 0x8F4F, 0x4803, 0x4700, 0xBF00];
 /// `NVIC_ISPR0`, and the bit of the voltage detector (ARMv7-M B3.4.5, RM0433 table 147).
-const ISPR0: u64 = 0xE000_E200;
-const PVD_PENDS: u64 = 1 << 1;
+pub(crate) const ISPR0: u64 = 0xE000_E200;
+pub(crate) const PVD_PENDS: u64 = 1 << 1;
 
 /// What stands before a handler in place of [`masking_stub`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,6 +100,12 @@ pub(crate) fn lock_up_serial_streams(part: &mut Part, at: VirtualNanos) -> bool 
     locked
 }
 
+/// Takes the receiver's request from its stream or gives it back: `EN` stands and the counter stays, as in a lock-up.
+pub(crate) fn lock_receiver(part: &mut Part, at: VirtualNanos, locked: bool) {
+    // DMAMUX1's channel 1 is that of DMA1 stream 1 (firmware/src/link/ring.rs).
+    write(part, at, DMAMUX1.base + 4, if locked { 0 } else { USART3_REQUESTS[0] });
+}
+
 /// A register; 0 where nothing answers.
 pub(crate) fn read(part: &mut Part, at: VirtualNanos, address: u64) -> u64 {
     Operate::read(part, at, address, Width::W32).unwrap_or_default()
@@ -140,7 +148,7 @@ pub(crate) fn masking_stub(host: &mut dyn Host, original: u64, from_ns: u64, for
         0xBF00, // nop
     ];
     let target = from_ns * 240 / 1000;
-    let words = [SPARE_REGISTER, TIM6.base + COUNTER, target, (for_ns / ROUND_NS).max(1), original | 1];
+    let words = [SPARE_REGISTER, TIM6.base + COUNTER, target, rounds(for_ns).max(1), original | 1];
     put(host, STUB, &code, &words)
 }
 

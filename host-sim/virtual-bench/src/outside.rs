@@ -120,6 +120,8 @@ pub enum Action {
     AdcScanCut,
     /// The serial port's DMA streams lock up where the errata sheet's condition for it holds.
     SerialStreamsLockUp,
+    /// The serial port's receiving stream serves no request any more, whatever locked it up, or does again.
+    ReceiverLocked(bool),
     /// The next so many times the link's interrupt comes, all interrupts are masked.
     MaskInterrupts {
         /// How often.
@@ -133,6 +135,8 @@ pub enum Action {
     LinkSilent(bool),
     /// So many bytes in a million reach the chip with a framing error and flipped bits.
     LinkGarbled(u32),
+    /// The board's 32 kHz crystal has this frequency, Hz; 0: it does not start.
+    LowSpeedCrystal(u64),
     /// The 3.3 V, of which every analogue code is a share, are these, in mV.
     AnalogSupply(u32),
     /// The chip's supply is cut or comes back. Memory other than flash is lost.
@@ -159,6 +163,9 @@ pub enum Action {
     ReadMap,
     /// From now on the stack below each interrupt's handler is painted and measured (`probe.rs`).
     MeasureStack,
+    /// The stack below the control tick is painted, and the chip crashes there: how deep that goes is read before it starts
+    /// again (`probe.rs`).
+    MeasureCrash(Crash),
     /// The 8 MHz stop, and the clock security system notices.
     ClockFails,
     /// The chip's supply falls, and the voltage detector notices.
@@ -170,6 +177,22 @@ pub enum Action {
         /// The bit.
         bit: u8,
     },
+}
+
+/// What ends the firmware with a crash record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Crash {
+    /// The voltage detector's interrupt.
+    Supply,
+    /// A trap.
+    HardFault,
+    /// The non-maskable interrupt: the clock fails.
+    Nmi,
+}
+
+impl Crash {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Supply, Self::HardFault, Self::Nmi];
 }
 
 /// The ±10 V wire from the amplifier to a drive.

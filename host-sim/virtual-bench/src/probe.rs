@@ -3,7 +3,8 @@
 //! What it finds it leaves at the stack's far end, which nothing else comes near: so it is for runs that look at nothing
 //! else there.
 
-use crate::interference::put;
+use crate::interference::{ICSR, ISPR0, NMI_PENDS, NOTHING, PVD_PENDS, put};
+use crate::outside::Crash;
 use rigless::emulator::Host;
 use rigless::soc::Width;
 
@@ -96,4 +97,52 @@ pub(crate) fn depth_meter(host: &mut dyn Host, which: u64, original: u64, painte
     let cell = FOUND + 4 * which;
     let _ = host.write(cell, Width::W32, 0);
     put(host, CODE + STRIDE * which, &CODE_OF_IT, &[painted, 0xA5A5_A5A5, original | 1, cell])
+}
+
+/// Bytes that are painted below the control tick for a crash: a crash that comes near has too little.
+pub const CRASH_PAINTED: u64 = 4096;
+/// What they are painted with.
+const CRASH_PAINT: u32 = 0xA5A5_A5A5;
+
+/// Puts code before the tick's handler `original` that keeps the stack's pointer in [`FOUND`], paints [`CRASH_PAINTED`] bytes
+/// below it, and crashes. Gives the word for the vector.
+pub(crate) fn crash_meter(host: &mut dyn Host, crash: Crash, original: u64) -> u64 {
+    const STORES: u16 = 0x6001; // str r1, [r0]
+    const LOADS: u16 = 0x6800; // ldr r0, [r0]
+    let (access, register, value) = match crash {
+        Crash::Supply => (STORES, ISPR0, PVD_PENDS),
+        Crash::HardFault => (LOADS, NOTHING, 0),
+        Crash::Nmi => (STORES, ICSR, NMI_PENDS),
+    };
+    let code = [
+        0x4808, // ldr  r0, found
+        0x4669, // mov  r1, sp
+        0x6001, // str  r1, [r0]
+        0x4A08, // ldr  r2, painted
+        0x1A8A, // subs r2, r1, r2
+        0x4B08, // ldr  r3, paint
+        0x6013, // next: str r3, [r2]
+        0x3204, // adds r2, #4
+        0x428A, // cmp  r2, r1
+        0xD1FB, // bne  next
+        0x4806, // ldr  r0, register
+        0x4907, // ldr  r1, value
+        access, 0xF3BF, 0x8F4F, // dsb
+        0x4806, // ldr  r0, original
+        0x4700, // bx   r0
+        0xBF00, // nop
+    ];
+    let words = [FOUND, CRASH_PAINTED, CRASH_PAINT.into(), register, value, original | 1];
+    put(host, CODE, &code, &words)
+}
+
+/// How deep the crash went that [`crash_meter`] made, with the frame that the core stacks, in bytes. To be asked before the
+/// core runs again.
+pub(crate) fn crash_depth(host: &mut dyn Host) -> u64 {
+    let top = host.read(FOUND, Width::W32).unwrap_or_default();
+    let painted = (top.saturating_sub(CRASH_PAINTED)..top)
+        .step_by(4)
+        .take_while(|at| host.read(*at, Width::W32).is_ok_and(|word| word == u64::from(CRASH_PAINT)))
+        .count() as u64;
+    CRASH_PAINTED - 4 * painted
 }

@@ -33,6 +33,10 @@ pub struct Record {
     pub saved: Option<Saved>,
     /// The first access that saw the fault the operator looked for.
     pub seen: Option<Seen>,
+    /// When the core arrived at code that was put in its way, ns.
+    pub arrivals: Vec<u64>,
+    /// How deep the stack went in each crash that was measured, bytes ([`Action::MeasureCrash`](crate::outside::Action)).
+    pub crash_depths: Vec<u64>,
     /// How the plant moved at the end of each control period since the operator began to look, ns.
     pub motion: Vec<(u64, Motion)>,
 }

@@ -65,6 +65,10 @@ pub fn soak(
     let plant = Request::assumed("fig20")?.plant()?;
     let outcome = bench::run(firmware, Box::new(plant), |endpoint| operate(endpoint, seconds, seed, tell))?;
     let mut soaked = outcome.operator;
+    soaked.stack.crash = stack::crashes(firmware)?;
+    if soaked.stack.left().is_none() {
+        soaked.problems.push(soaked.stack.to_string());
+    }
     if !outcome.record.restarts.is_empty() {
         soaked.problems.push(format!("it restarted: {:?}", outcome.record.restarts));
     }
@@ -92,9 +96,6 @@ fn operate(
     stack::measure_interrupts(endpoint)?;
     round(endpoint, &mut chance, &health, &mut soaked)?;
     (soaked.stack.tick, soaked.stack.drivers) = stack::interrupts(endpoint)?;
-    if soaked.stack.left().is_none() {
-        soaked.problems.push(soaked.stack.to_string());
-    }
     let flash = endpoint.memory(SETTINGS.start, SETTINGS.end - SETTINGS.start)?;
     let written = flash.chunks(32).filter(|word| word.iter().any(|byte| *byte != 0xFF)).count() as u64;
     soaked.flash_words = (written, (SETTINGS.end - SETTINGS.start) / 32);

@@ -235,7 +235,8 @@ pub struct Hello {
     pub counts_per_rev: u32,
     /// Why the chip started.
     pub reset: ResetCause,
-    /// The clock comes from the crystal; if not, times and speeds are off by up to 1 %.
+    /// The clock comes from the 8 MHz of the ST-LINK, not from the chip's own oscillator. What they are worth is another
+    /// question: they may be an RC oscillator's too.
     pub crystal: bool,
     /// There is a crash record from before the last restart.
     pub crash_record: bool,

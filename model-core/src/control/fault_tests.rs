@@ -232,6 +232,37 @@ fn a_bit_of_the_mode_that_turns_over_makes_safe_in_its_tick() {
     comes_back_only_by_hand(&mut bench, Fault::StateCorrupt);
 }
 
+/// Whether the disc at this true speed shows as over-speed to a chip whose clock is so many times as fast as it should be.
+fn is_over_speed(speed_rad_s: f64, clock: f64) -> bool {
+    let settings = ControlSettings::default();
+    let config = settings.build().unwrap();
+    let mut state = ControlState::new(&config);
+    let period_s = f64::from(settings.tick_s) / clock;
+    let counts =
+        speed_rad_s * f64::from(settings.m2_encoder.counts_per_rev) / std::f64::consts::TAU * period_s;
+    (0..2000).any(|tick| {
+        let m2_count = (f64::from(tick) * counts) as u32;
+        let samples = Samples { m2_count, adc_fresh: true, ..Samples::default() };
+        let causes = step(&config, &mut state, &samples).record.causes;
+        // The estimator begins at rest.
+        tick > 1000 && causes.contains(Fault::OverSpeed)
+    })
+}
+
+/// What the 8 MHz are worth is known to 1 % (firmware/PINS.md, Clock).
+#[test]
+fn a_clock_that_is_off_by_1_percent_trips_at_no_allowed_speed_and_at_the_cap() {
+    let limits = ControlSettings::default().limits;
+    let (allowed, over) = (f64::from(limits.speed_rad_s), f64::from(limits.over_speed_rad_s));
+    let cap = f64::from(validate::HARD_SPEED_RAD_S);
+    for clock in [0.99, 1.0, 1.01] {
+        assert!(!is_over_speed(allowed, clock), "the allowed {allowed} rad/s trip, clock {clock}");
+        assert!(is_over_speed(cap, clock), "the cap of {cap} rad/s does not trip, clock {clock}");
+        // The limit itself moves with the clock, and by no more.
+        assert!(is_over_speed(over * 1.005 * clock, clock) && !is_over_speed(over * 0.995 * clock, clock));
+    }
+}
+
 #[test]
 fn what_is_found_at_the_start_is_latched_after_the_self_check() {
     for (restart, intact, fault) in [

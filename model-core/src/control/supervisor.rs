@@ -15,6 +15,10 @@
 //! only. To arm takes the command **and** the arm switch, and the switch must have been seen off since the start and
 //! since the last fault, so a switch left on never arms by itself.
 //!
+//! Arming asks for no tare. A tare makes the readings better and nothing safer: it moves the bridges' zeros by no more than
+//! `tare_limit` (1 N·m, 15 N), no torque is enabled by a reading of theirs, and the normal force at which the drives go off
+//! is held by the bridge's raw code too, which no tare moves (`caps.rs`). It may also be taken while armed.
+//!
 //! A cause latches while the drives are enabled. While they are disabled it only stands in the way of arming and is
 //! shown: nothing had to be stopped, so there is nothing to clear. What is found at the start (damaged settings,
 //! watchdog, panic, trap) is latched when the self-check ends. Faults are cleared by command, with no cause left; new

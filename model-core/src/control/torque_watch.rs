@@ -18,10 +18,26 @@
 //! defaults (τ = 1 ms, rated 8 N·m, A = 4.8 mN·m·s) an open wire that asks an armed drive for its rated torque is found
 //! within 1.7 ms, before M2 has turned its disc by a milliradian; half the gain at 4.8 N·m within 5 ms.
 //!
+//! That is a matter of the settings: with τ = 0.1 s and l = 1, each within its own range, it would be 0.32 s. So the settings
+//! together may ask for 20 ms at most for the open wire of an armed drive, (A + τ·τ_rated)/(τ_rated − b₀)
+//! ([`MOST_OPEN_WIRE_S`]). The largest rated torque that is allowed, 10 N·m, then makes 10 rad/s of the assumed disc of
+//! 0.02 kg·m², a third of the allowed speed, and turns it by 0.1 rad: 6 mm at the elements. M1 is stopped by over-force
+//! before, as its mechanism follows in some ms. Smaller deviations take longer, by the formula.
+//!
 //! Left out: deviations below b, which the trim makes up for and over-speed and over-force bound; a monitor that fails
 //! together with its drive and shows what is expected.
 
 use super::settings::{DriveSettings, TorqueWatchSettings};
+
+/// Longest time in which an open reference wire of an armed drive must show, s; the head of this file has its derivation.
+pub(crate) const MOST_OPEN_WIRE_S: f32 = 0.02;
+
+/// Time in which the watch finds an open reference wire that asks an armed drive for its rated torque, s; none if never.
+pub(crate) fn open_wire_s(drive: &DriveSettings, watch: &TorqueWatchSettings, tick_s: f32) -> Option<f32> {
+    let excess_nm = drive.rated_torque_nm - watch.offset_tolerance_nm;
+    let most = 2.0 * drive.rated_torque_nm * (watch.lag_tolerance * drive.torque_lag_s + tick_s);
+    (excess_nm > 0.0).then(|| (most + drive.torque_lag_s * drive.rated_torque_nm) / excess_nm)
+}
 
 /// Coefficients of the watch over one drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,6 +155,35 @@ mod tests {
             // And not much earlier: the tolerances are there to be used.
             assert!(after_s > 0.5 * promised_s, "{command}: {after_s} s, promised {promised_s} s");
         }
+    }
+
+    #[test]
+    fn an_open_wire_of_an_armed_drive_is_found_in_the_time_that_the_settings_may_ask_for() {
+        let s = ControlSettings::default();
+        let default_s = open_wire_s(&s.m2, &s.torque_watch, s.tick_s).unwrap();
+        assert!((default_s - 1.68e-3).abs() < 1e-5, "{default_s}");
+        // The slowest drive that these tolerances allow: 13 ms.
+        let slow = |torque_lag_s| {
+            let mut s = s;
+            (s.m2.torque_lag_s, s.m1.torque_lag_s) = (torque_lag_s, torque_lag_s);
+            s
+        };
+        let most = (1..1000).map(|n| slow(n as f32 * 1e-4)).take_while(|s| s.build().is_ok()).last().unwrap();
+        let promised_s = open_wire_s(&most.m2, &most.torque_watch, most.tick_s).unwrap();
+        assert!(promised_s <= MOST_OPEN_WIRE_S && promised_s > 0.98 * MOST_OPEN_WIRE_S, "{promised_s}");
+        let (watch, mut state) =
+            (TorqueWatch::new(&most.m2, &most.torque_watch, most.tick_s), TorqueWatchState::default());
+        let mut torque = 0.0;
+        let found = (1..1000).find(|_| {
+            torque += (8.0 - torque) * (1.0 - libm::exp(-TICK_S / f64::from(most.m2.torque_lag_s)));
+            watch.step(&mut state, torque as f32)
+        });
+        let found_s = found.expect("found") as f64 * TICK_S;
+        assert!(found_s <= f64::from(promised_s) + 2.0 * TICK_S, "{found_s} s, promised {promised_s} s");
+        // A watch that is blind to the whole rated torque is none.
+        let mut blind = s;
+        (blind.m2.rated_torque_nm, blind.torque_watch.offset_tolerance_nm) = (1.5, 2.0);
+        assert_eq!(blind.build().err().map(|error| error.name), Some("m2.torque_lag_s"));
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! One line a setting: its name, its range, its unit. The message of a refusal is made from the same line. The caps
 //! are what the rig's mechanics and amplifiers bear (assumed, as the whole rig: see the settings' defaults).
 
-use super::settings::ControlSettings;
+use super::settings::{ControlSettings, DriveSettings};
+use super::torque_watch::{MOST_OPEN_WIRE_S, open_wire_s};
 use crate::error::{ParameterError, require};
 
 /// Torque of a drive: rated torque and over-torque lie below it.
@@ -129,6 +130,19 @@ pub(crate) fn validate(s: &ControlSettings) -> Result<(), ParameterError> {
     within!(s.torque_watch.offset_tolerance_nm, 0.01..=2.0, " N·m");
     within!(s.torque_watch.gain_tolerance, 0.0..=0.5, "");
     within!(s.torque_watch.lag_tolerance, 0.0..=1.0, "");
+    let shows = |drive: &DriveSettings| {
+        open_wire_s(drive, &s.torque_watch, s.tick_s).is_some_and(|time_s| time_s <= MOST_OPEN_WIRE_S)
+    };
+    relation!(
+        s.m1.torque_lag_s,
+        shows(&s.m1),
+        "less, or less of torque_watch: an open wire must show in 20 ms"
+    );
+    relation!(
+        s.m2.torque_lag_s,
+        shows(&s.m2),
+        "less, or less of torque_watch: an open wire must show in 20 ms"
+    );
     within!(s.timing.boot_s, 0.0..=10.0, " s");
     relation!(s.timing.adc_frozen_ticks, s.timing.adc_frozen_ticks <= 100_000, "0 … 100000");
     relation!(s.timing.adc_stall_ticks, (1..=100).contains(&s.timing.adc_stall_ticks), "1 … 100");

@@ -113,7 +113,7 @@ fn firmware(run: &mut Runner, root: &Path) {
     // They are for a board; that they link is all that can be said here.
     run.cargo("firmware's tests", "firmware", &["test", "--quiet", "--release", "--no-run"]);
     let elf = root.join("firmware/target").join(TARGET).join("release/rig-firmware");
-    match size::of(&elf) {
+    match size::of(&elf, &root.join("host-sim/virtual-bench/budget.toml")) {
         Ok(size) => run.note("firmware size", Ended::Passed(size.to_string())),
         Err(error) => run.note("firmware size", Ended::Failed(error)),
     }

@@ -415,7 +415,8 @@ fn repair(endpoint: &mut Endpoint, listener: &mut ListeningHost, case: &FaultCas
         .actions
         .iter()
         .any(|action| matches!(action, Action::AnalogueInput(..) | Action::AnalogueFrozen(_)));
-    listener.listen(endpoint, endpoint.now_ns() + if held { MOVING_NS } else { REPAIRED_NS })
+    let settled = case.lasts_ns + if held { MOVING_NS } else { REPAIRED_NS };
+    listener.listen(endpoint, endpoint.now_ns() + settled)
 }
 
 fn recover(

@@ -88,6 +88,19 @@ impl State {
         outcome.record.saved.ok_or_else(|| BenchError::Emulator("nothing was kept".to_owned()))
     }
 
+    /// The whole bench in the middle of other motion, as an experiment's steps.
+    ///
+    /// # Errors
+    /// The firmware does not get there.
+    pub fn kept_during(firmware: &Firmware, motion: &str) -> Result<Saved, BenchError> {
+        let outcome = bench::run(firmware, Box::new(Self::Sliding.plant()?), |endpoint| {
+            boot(endpoint)?;
+            during(endpoint, motion)?;
+            endpoint.snapshot()
+        })?;
+        outcome.record.saved.ok_or_else(|| BenchError::Emulator("nothing was kept".to_owned()))
+    }
+
     /// The plant it is reached with.
     ///
     /// # Errors

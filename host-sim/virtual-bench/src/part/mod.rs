@@ -2,6 +2,7 @@
 //! firmware uses. One file a peripheral, each with the rules of the reference manual (RM0433 rev 9) it follows.
 
 pub mod adc_trigger;
+pub mod capture_timer;
 pub mod dac;
 pub mod encoder_timer;
 pub mod iwdg;

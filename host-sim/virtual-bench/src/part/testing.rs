@@ -90,6 +90,13 @@ impl Bench {
         Some(cause)
     }
 
+    /// The low-speed crystal runs at this frequency from now on.
+    pub(crate) fn crystal(&mut self, hz: u64) {
+        let running = self.part.soc.bus().slot("TIM16").unwrap();
+        let (_, mut context) = self.part.soc.bus_mut().drive(self.now, running);
+        self.part.tim16.crystal(hz, &mut context);
+    }
+
     /// A reset for `cause`.
     pub(crate) fn reset(&mut self, cause: ResetCause) {
         self.part.reset(self.now, cause);

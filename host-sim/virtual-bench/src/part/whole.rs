@@ -5,13 +5,16 @@
 //! converter's inputs, edges under way. So do the option bytes, which are flash.
 
 use super::adc_trigger::{REFERENCE_MICROVOLT, TriggeredAdc};
+use super::capture_timer::CaptureTimer;
 use super::dac::Dac;
 use super::encoder_timer::EncoderTimer;
 use super::iwdg::Iwdg;
 use super::trigger_timer::TriggerTimer;
+use crate::interference;
 use rigless::device::{Device, ErasedDevice, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
+use rigless::soc::stm32h743::generated::RCC;
 use rigless::soc::stm32h743::peripherals::adc::Converter;
 use rigless::soc::stm32h743::peripherals::tim::{TIMERS, Timer};
 use rigless::soc::{Bus, Error};
@@ -48,9 +51,9 @@ impl Motor {
 /// Instances that hear every request of every other one and that the firmware leaves alone. Their models would take a
 /// fifth of the emulator's time to find that nothing concerns them. Without a model, an access to one is a gap
 /// (`gaps.rs`), and the run fails.
-const LEFT_ALONE: [&str; 18] = [
-    "TIM1", "TIM5", "TIM8", "TIM12", "TIM13", "TIM14", "TIM15", "TIM16", "TIM17", "SPI1", "SPI2", "SPI3",
-    "SPI4", "SPI5", "SPI6", "DMA2", "BDMA", "DMAMUX2",
+const LEFT_ALONE: [&str; 17] = [
+    "TIM1", "TIM5", "TIM8", "TIM12", "TIM13", "TIM14", "TIM15", "TIM17", "SPI1", "SPI2", "SPI3", "SPI4",
+    "SPI5", "SPI6", "DMA2", "BDMA", "DMAMUX2",
 ];
 
 /// Slots of the instances that have a model of ours, and of the serial port.
@@ -62,6 +65,7 @@ struct Slots {
     iwdg: usize,
     adc1: usize,
     tim6: usize,
+    tim16: usize,
     encoders: [usize; 2],
     usart3: usize,
     rcc: usize,
@@ -80,12 +84,14 @@ pub struct Part {
     pub adc1: TriggeredAdc,
     /// TIM6.
     pub tim6: TriggerTimer,
+    /// TIM16.
+    pub tim16: CaptureTimer,
     /// The encoders' timers, by [`Motor`].
     pub encoders: [EncoderTimer; 2],
     slots: Slots,
 }
 
-store!(Part { values: [dac, iwdg, adc1, tim6, encoders], parts: [soc], built: [slots] });
+store!(Part { values: [dac, iwdg, adc1, tim6, tim16, encoders], parts: [soc], built: [slots] });
 
 impl Part {
     /// Index of USART3 among the emulator's serial ports.
@@ -111,6 +117,7 @@ impl Part {
             iwdg: bus.slot("IWDG")?,
             adc1: bus.slot("ADC1")?,
             tim6: bus.slot("TIM6")?,
+            tim16: bus.slot("TIM16")?,
             encoders: [
                 bus.slot(Motor::M1.encoder_timer().instance)?,
                 bus.slot(Motor::M2.encoder_timer().instance)?,
@@ -124,6 +131,7 @@ impl Part {
             iwdg: Iwdg::default(),
             adc1: TriggeredAdc::new(),
             tim6: TriggerTimer::new(),
+            tim16: CaptureTimer::new(),
             encoders: Motor::ALL.map(|motor| EncoderTimer::new(motor.encoder_timer())),
             slots,
         })
@@ -144,6 +152,33 @@ impl Part {
         let (registers, mut context) = self.soc.bus_mut().drive(at, self.slots.rcc);
         aside.rcc.fail_hse(registers, &mut context);
         std::mem::swap(&mut aside.rcc, &mut self.soc.rcc);
+    }
+
+    /// The 32 kHz crystal on the board from now on; 0: it does not start, however long the chip asks it to.
+    pub fn fit_low_speed_crystal(&mut self, hz: u64) {
+        let (hse, _) = self.soc.rcc.crystals();
+        self.soc.rcc.attach_crystals(hse, hz);
+    }
+
+    /// Hands the crystal's edges to TIM16 while they come. To be called now and then, some times in its start-up.
+    pub fn run_low_speed_crystal(&mut self, at: VirtualNanos) {
+        /// `RCC_BDCR`, `LSEON` and `LSERDY` (RM0433, `RCC_BDCR`).
+        const BDCR: u64 = RCC.base + 0x70;
+        const ON: u64 = 1 << 0;
+        const READY: u64 = 1 << 1;
+        let (_, hz) = self.soc.rcc.crystals();
+        if hz == 0 {
+            // The emulator's becomes ready all the same, after its start-up: so that begins anew.
+            let control = interference::read(self, at, BDCR);
+            if control & ON != 0 {
+                interference::write(self, at, BDCR, control & !ON);
+                interference::write(self, at, BDCR, control);
+            }
+        } else if self.tim16.counts() {
+            let ready = interference::read(self, at, BDCR) & READY != 0;
+            let (_, mut context) = self.soc.bus_mut().drive(at, self.slots.tim16);
+            self.tim16.crystal(if ready { hz } else { 0 }, &mut context);
+        }
     }
 
     /// Asks for the part's supply to be cut or given back.
@@ -194,6 +229,7 @@ impl Mcu for Part {
         Device::reset(&mut self.iwdg);
         Device::reset(&mut self.adc1);
         Device::reset(&mut self.tim6);
+        Device::reset(&mut self.tim16);
         for encoder in &mut self.encoders {
             Device::reset(encoder);
         }
@@ -210,12 +246,13 @@ impl Mcu for Part {
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
-        let Self { soc, dac, iwdg, adc1, tim6, encoders: [m1, m2], slots } = self;
+        let Self { soc, dac, iwdg, adc1, tim6, tim16, encoders: [m1, m2], slots } = self;
         let own: &mut dyn ErasedDevice = match slot {
             _ if slot == slots.dac => dac,
             _ if slot == slots.iwdg => iwdg,
             _ if slot == slots.adc1 => adc1,
             _ if slot == slots.tim6 => tim6,
+            _ if slot == slots.tim16 => tim16,
             _ if slot == slots.encoders[0] => m1,
             _ if slot == slots.encoders[1] => m2,
             _ if slots.left_alone.get(slot) == Some(&true) => return (soc.bus_mut(), None),

@@ -20,7 +20,8 @@ use std::sync::OnceLock;
 use virtual_bench::elf::Firmware;
 use virtual_bench::firmware_build;
 
-/// The release ELF, built once; or the one that the environment names, to see a check red on a firmware of before.
+/// The release ELF, built once; or the one that the environment names, to see a check red on a firmware that is broken
+/// (firmware/README.md).
 fn firmware() -> &'static Firmware {
     static FIRMWARE: OnceLock<Firmware> = OnceLock::new();
     FIRMWARE.get_or_init(|| {
