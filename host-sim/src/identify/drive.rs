@@ -260,12 +260,16 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
             ),
             concat(&|log| direction(log, v)),
         ),
+        // No bearing drives: under a proportional speed loop the torque falls with speed, and would be taken for it.
         (
-            wide(
-                "viscous",
-                prior.viscous.unwrap_or(0.0),
-                prior.viscous.map_or(own / v, |c| (2.0 * c).max(0.2 * own / v)),
-            ),
+            Parameter {
+                lower: 0.0,
+                ..wide(
+                    "viscous",
+                    prior.viscous.unwrap_or(0.0),
+                    prior.viscous.map_or(own / v, |c| (2.0 * c).max(0.2 * own / v)),
+                )
+            },
             concat(&|log| log.speed.clone()),
         ),
         (

@@ -44,6 +44,12 @@ const DISC_SHARE: [f64; 2] = [0.1, 0.9];
 /// From the width of some counts of an encoder to a loose key's.
 const GAP_RAD: [f64; 2] = [1e-4, 0.3];
 
+/// Pull with which a coupling is weighed against other causes: it moves the disc no further in a sample than the spring itself
+/// does for the same error, (ω dt)² of it. A stronger one repeats the measurement in the spring's place.
+fn judged(numbers: &TwoMass, log: &DriveLog) -> f64 {
+    PULL.min((std::f64::consts::TAU * numbers.mode_hz * log.grid.step_s).powi(2))
+}
+
 /// Numbers of a coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoMass {
@@ -202,7 +208,7 @@ pub fn alternative_of_grid(
         let numbers =
             TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
         let bearing = view.balance.bearing(&[]);
-        return alternative(effect, view, &numbers, &bearing, PULL)
+        return alternative(effect, view, &numbers, &bearing, judged(&numbers, &view.logs[0]))
             .map(|form| reckoned(view, &numbers, &bearing, form));
     }
     let trial = |numbers: &TwoMass, bearing: &[f64], pull: f64| -> Option<Trial> {
@@ -242,7 +248,7 @@ pub fn alternative_of_grid(
             (numbers, log_prior) = (better.numbers, occam);
         }
     }
-    let found = alternative(effect, view, &numbers, &bearing, PULL)?;
+    let found = alternative(effect, view, &numbers, &bearing, judged(&numbers, &view.logs[0]))?;
     Some(Alternative { log_prior, ..reckoned(view, &numbers, &bearing, found) })
 }
 

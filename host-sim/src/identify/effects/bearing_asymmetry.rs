@@ -14,6 +14,8 @@ pub(super) struct BearingAsymmetry;
 
 /// Part of the drag between Coulomb's, which does not grow, and the viscous one: over the root of speed.
 const ROOT: &str = "root_half_difference";
+/// Share of the motion that goes the rarer way at least.
+const SEEN: f64 = 0.01;
 /// Ends of the names of what belongs to one direction.
 const WAYS: [&str; 2] = ["_forward", "_backward"];
 
@@ -28,6 +30,12 @@ impl Effect for BearingAsymmetry {
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let s = view.scales;
+        // What turns one way alone does not show a difference, and its columns would be those of the bearing itself.
+        let turned = view.logs.iter().flat_map(|log| direction(log, s.speed));
+        let (forward, backward) = turned.fold((0.0, 0.0), |(f, b), d| (f + d.max(0.0), b - d.min(0.0)));
+        if f64::min(forward, backward) < SEEN * (forward + backward) {
+            return Vec::new();
+        }
         let magnitude = |values: Vec<f64>| values.into_iter().map(f64::abs).collect::<Vec<f64>>();
         let coulomb = view.logs.iter().flat_map(|log| magnitude(direction(log, s.speed))).collect();
         let viscous = view.logs.iter().flat_map(|log| magnitude(log.speed.clone())).collect();

@@ -8,8 +8,9 @@ use super::{DriveLog, DriveView};
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
 
-/// Widths, in shares of the usual speed: from standstill to all of it, a factor of two apart.
-const SHARES: [f64; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
+/// Widths, in shares of the usual speed: from standstill to half of it, a factor of two apart. What falls at the usual speed
+/// itself is no friction near zero, but a controller that gives less torque the faster it turns.
+const SHARES: [f64; 7] = [0.0078, 0.0156, 0.0312, 0.0625, 0.125, 0.25, 0.5];
 /// What the names of a width and of its excess begin with.
 const SPEED: &str = "stribeck_speed";
 const EXCESS: &str = "static_excess";
