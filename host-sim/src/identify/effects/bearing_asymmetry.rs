@@ -1,7 +1,6 @@
 //! `bearing_asymmetry`: the bearing's friction differs per direction.
 //!
-//! Half the difference is even in speed: Coulomb and viscous friction, beside them a drag that grows more and more slowly, as a
-//! lubricant's does, or each direction with a Stribeck curve of its own.
+//! Half the difference is even in speed: Coulomb and viscous friction, or each direction with a Stribeck curve of its own.
 
 use super::stribeck_curve::Curve;
 use super::{About, DriveLaw, DriveView, Effect};
@@ -12,8 +11,6 @@ use crate::identify::term::Parameter;
 /// The effect.
 pub(super) struct BearingAsymmetry;
 
-/// Part of the drag between Coulomb's, which does not grow, and the viscous one: over the root of speed.
-const ROOT: &str = "root_half_difference";
 /// Share of the motion that goes the rarer way at least.
 const SEEN: f64 = 0.01;
 /// Ends of the names of what belongs to one direction.
@@ -47,18 +44,8 @@ impl Effect for BearingAsymmetry {
             ]
         };
         let plain = Alternative {
-            log_prior: -3f64.ln(),
+            log_prior: -2f64.ln(),
             ..Alternative::columns(self.id(), parameters(), vec![coulomb.clone(), viscous.clone()])
-        };
-        let root = |log: &super::DriveLog| log.filtered(&log.speed.iter().map(|v| v.abs().sqrt()).collect::<Vec<_>>());
-        let with_root = Alternative {
-            form: "grows more and more slowly".into(),
-            log_prior: -3f64.ln(),
-            ..Alternative::columns(
-                self.id(),
-                parameters().into_iter().chain([Parameter::amplitude(ROOT, s.own / s.speed.sqrt())]).collect(),
-                vec![coulomb.clone(), viscous.clone(), view.logs.iter().flat_map(root).collect()],
-            )
         };
         let curve = Curve::new(view);
         let excesses = WAYS.into_iter().flat_map(|way| curve.parameters(way, s.own));
@@ -66,14 +53,14 @@ impl Effect for BearingAsymmetry {
         let with_curves = Alternative {
             form: "a Stribeck curve each way".into(),
             constants: curve.constants(),
-            log_prior: -3f64.ln(),
+            log_prior: -2f64.ln(),
             ..Alternative::columns(
                 self.id(),
                 parameters().into_iter().chain(excesses).collect(),
                 [coulomb, viscous].into_iter().chain(columns).collect(),
             )
         };
-        vec![plain, with_root, with_curves]
+        vec![plain, with_curves]
     }
 
     fn drive_law(&self, value: &dyn Fn(&str) -> Option<f64>) -> Option<DriveLaw> {
@@ -81,12 +68,11 @@ impl Effect for BearingAsymmetry {
         let (coulomb, viscous) = (part("coulomb"), part("viscous"));
         coulomb.or(viscous)?;
         let (coulomb, viscous) = (coulomb.unwrap_or(0.0), viscous.unwrap_or(0.0));
-        let root = value(ROOT).unwrap_or(0.0);
         let [forward, backward] = WAYS.map(|way| Curve::of_file(way, value));
         Some(DriveLaw::effort(move |v: f64| {
             let excess = |curve: &Option<Box<dyn Fn(f64) -> f64>>| curve.as_ref().map_or(0.0, |of| of(v));
             let fall = if v > 0.0 { excess(&forward) } else { -excess(&backward) };
-            coulomb + root * v.abs().sqrt() + viscous * v.abs() + fall
+            coulomb + viscous * v.abs() + fall
         }))
     }
 }
