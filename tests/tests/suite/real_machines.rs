@@ -194,7 +194,7 @@ fn the_cogging_motor_has_order_72_and_less_of_it_where_it_is_compensated() {
 }
 
 #[test]
-#[ignore = "driven to and fro, its position goes with its direction: answered unknown so far"]
+#[ignore = "what its reversals leave is more than direction or load explain: answered unknown so far"]
 fn the_band_brake_holds_by_direction_and_by_load() {
     let mut bench = Bench::new();
     for (name, holdout) in [
