@@ -54,9 +54,9 @@ pub fn lines(x: &[Vec<f64>], r: &[Vec<f64>], candidates: &[f64], most: usize, ov
     found
 }
 
-/// Wave numbers that together with the base columns and those of `company` leave least, one after the other, at most `most`: for a position that
-/// dwells at few values, where all orders look alike and only the whole balance tells them apart. With a phase for each log
-/// where `own_phase` is set.
+/// Wave numbers that together with the base columns and those of `company` leave least, one after the other, at most `most`: for
+/// a position that dwells at few values, where all orders look alike and only the whole balance tells them apart. With a phase
+/// for each log where `own_phase` is set.
 pub fn joint(
     balance: &Balance,
     position: &[f64],
