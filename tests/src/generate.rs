@@ -125,9 +125,9 @@ fn contact_case(scenario: &Scenario) -> GeneratedCase {
         courses.iter().enumerate().map(log).collect()
     };
     // A speed loop that hunts (a late drive on a soft shaft) is turned down before anything is logged.
-    let turned_down = (0..=MOST_HALVINGS).map(|halvings| logs_at(bandwidth_rad_s / 2f64.powi(halvings)));
+    let mut turned_down = (0..=MOST_HALVINGS).map(|halvings| logs_at(bandwidth_rad_s / 2f64.powi(halvings)));
     let hunts = |logs: &Vec<CleanLog>| logs.iter().any(|log| log.hunts(rig.rated_torque_nm));
-    let logs = turned_down.skip_while(hunts).next().unwrap_or_else(|| logs_at(bandwidth_rad_s));
+    let logs = turned_down.find(|logs| !hunts(logs)).unwrap_or_else(|| logs_at(bandwidth_rad_s));
 
     let mut residuals: Vec<_> = logs.iter().map(|log| log.residual).collect();
     let samples: Vec<_> = logs.into_iter().map(|log| log.samples).collect();
