@@ -11,7 +11,7 @@ use crate::identify::term::Parameter;
 /// The effect.
 pub(super) struct BearingAsymmetry;
 
-/// Share of the motion that goes the rarer way at least.
+/// Share of the motion that goes the rarer way at least: less is the encoder's noise about a standstill.
 const SEEN: f64 = 0.01;
 /// Ends of the names of what belongs to one direction.
 const WAYS: [&str; 2] = ["_forward", "_backward"];
