@@ -331,4 +331,19 @@ mod tests {
             noise(false)
         );
     }
+
+    #[test]
+    fn a_controller_that_gives_less_torque_the_faster_it_turns_is_no_bearing_that_drives() {
+        // Speed wobbles by a third; the torque is what a proportional loop makes of it.
+        let time: Vec<f64> = (0..4000).map(|i| 1e-3 * f64::from(i)).collect();
+        let position: Vec<f64> = time.iter().map(|t| 6.0 * t - 0.1 * (20.0 * t).cos()).collect();
+        let effort: Vec<f64> = time.iter().map(|t| 0.1 * (8.0 - 6.0 - 2.0 * (20.0 * t).sin())).collect();
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        let log = DriveLog::made("log".into(), grid, effort, position, None, None, usable, 0.0);
+        let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
+        let scales = DriveScales::new(std::slice::from_ref(&log));
+        let p = balance(&[log], &nothing, &scales).solve(&[], &[]).p;
+        assert!(p[COULOMB + 1] >= 0.0, "{p:?}");
+    }
 }
