@@ -1,6 +1,8 @@
 //! Linear filters on an even grid that are the same for every term of a balance, so that both sides of an
 //! equation see the same one and no noise is differentiated on one side only.
 
+use wide::f64x4;
+
 use super::linear::dot;
 
 /// A Gaussian is cut off after so many standard deviations: what is left out is 6e-5 of its area.
@@ -183,6 +185,17 @@ pub fn shifted(values: &[f64], ahead: f64) -> Vec<f64> {
             }
         })
         .collect()
+}
+
+/// e^x of each.
+pub fn exponentials(values: &[f64]) -> Vec<f64> {
+    let mut out = values.to_vec();
+    let mut four = out.chunks_exact_mut(4);
+    for x in &mut four {
+        x.copy_from_slice(f64x4::from([x[0], x[1], x[2], x[3]]).exp().as_array_ref());
+    }
+    four.into_remainder().iter_mut().for_each(|x| *x = x.exp());
+    out
 }
 
 /// Central differences per sample.

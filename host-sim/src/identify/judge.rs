@@ -387,13 +387,17 @@ pub fn judge(
         let (noise, ranked, sizes, best) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, progress);
-            let fitted = found.ranked.iter().map(|r| &r.fit);
             let best = found.ranked.first().map_or(0.0, |r| r.log_evidence);
+            let in_question = |ranked: &&search::Ranked| best - ranked.log_evidence <= OUT_OF_QUESTION;
+            let mut fitted: Vec<&Fit> = found.ranked.iter().map(|r| &r.fit).collect();
+            let subsets =
+                search::subsets(&problem, found.ranked.iter().filter(in_question).map(|r| &r.fit), &fitted);
+            fitted.extend(&subsets);
             let sizes = |ranked: &search::Ranked| {
-                if best - ranked.log_evidence > OUT_OF_QUESTION {
-                    search::largest_sizes(&problem, &ranked.fit)
+                if in_question(&ranked) {
+                    search::sizes(&problem, &ranked.fit, &fitted)
                 } else {
-                    search::sizes(&problem, &ranked.fit, fitted.clone())
+                    search::largest_sizes(&problem, &ranked.fit)
                 }
             };
             let sizes: Vec<Vec<f64>> = found.ranked.par_iter().map(sizes).collect();

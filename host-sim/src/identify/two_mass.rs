@@ -17,8 +17,8 @@ use super::filters::gaussian;
 use super::linear;
 use super::term::Parameter;
 
-/// A mode turns by less than this in a step within a sample, rad: its frequency is then right to φ²/24, 2e-4.
-const TURN_IN_A_STEP: f64 = 0.06;
+/// A mode turns by less than this in a step within a sample, rad: its frequency is then right to φ²/24, 6e-4.
+const TURN_IN_A_STEP: f64 = 0.12;
 /// Pull towards the observed shaft torque, per sample, with which shapes are compared: far from the truth only a disc that is
 /// held near the motor has a motion that resembles its own.
 const PULL: f64 = 0.1;

@@ -7,9 +7,11 @@
 //! root's way makes z uncertain: where the contact slides that is not at all, at rest it may be all.
 //! Left out: what the root did between samples.
 
-use super::law::{Contact, Curve};
+use super::law::Contact;
 use super::observer::{Drive, Observed, SLIP_NOISES, least_load_n};
 
+/// Over so many of the bristles' own ways nothing is left of where they were, e⁻³⁷ < 2⁻⁵³.
+const FORGOTTEN: f64 = 37.0;
 /// Points of Gauss and Hermite over the noise of the way: deviations from the mean, and weights.
 const WAYS: [(f64, f64); 3] =
     [(0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0), (-1.732_050_807_568_877_2, 1.0 / 6.0)];
@@ -21,7 +23,6 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let force = drive.force_n;
     let mut out = Observed::new(n);
     out.force_n[0] = force[0];
-    let (per_log, log_slowest) = Curve::scale_of_table();
     let (per_load, film) = contact.viscous;
     let least_load = least_load_n(drive);
     let (speed_noise, channel) = (drive.noise.0, drive.noise.1.powi(2).max(1e-24));
@@ -40,22 +41,25 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
             out.sliding[i] = 1.0;
             continue;
         }
-        let mut limit = drive.log_factor.map_or(load, |m| load * m[i].exp());
+        let mut limit = drive.factor.map_or(load, |factor| load * factor[i]);
         if let (Some(ageing), Some(age)) = (&contact.ageing, age) {
             limit *= ageing.factor(age);
         }
-        limit *= contact.curve.at(speed, per_log, log_slowest);
+        limit *= contact.curve.at(speed);
 
         // The bristles, and how the noise of the way makes them uncertain: over a reversal it is the direction itself.
         let follow = |way: f64| {
             let target = limit.copysign(way);
-            let left = (-way.abs() * k / limit).exp();
+            let ways = way.abs() * k / limit;
+            let left = if ways < FORGOTTEN { (-ways).exp() } else { 0.0 };
             (target + (held_n - target) * left, left)
         };
-        let points = WAYS.map(|(off, weight)| (follow(way + off * speed_noise * dt).0, weight));
+        let (still, left) = follow(way);
+        let points = WAYS.map(|(off, weight)| {
+            (if off == 0.0 { still } else { follow(way + off * speed_noise * dt).0 }, weight)
+        });
         let mean: f64 = points.iter().map(|(at, weight)| weight * at).sum();
         let spread: f64 = points.iter().map(|(at, weight)| weight * (at - mean).powi(2)).sum();
-        let left = follow(way).1;
         variance = left * left * variance + spread;
         held_n = mean;
 
@@ -81,6 +85,7 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::contact::law::Curve;
     use crate::identify::noise::White;
 
     const STEP_S: f64 = 1e-3;
@@ -111,7 +116,7 @@ mod tests {
             root_m,
             load_n,
             force_n,
-            log_factor: None,
+            factor: None,
             slip_threshold_m_s: 5e-3,
             noise,
         }

@@ -107,7 +107,7 @@ impl ContactLog {
         let smooth_nm = gaussian(&friction_nm, 2.0, 0);
         let friction_change_nm = local_maximum(&magnitudes(&gradient(&smooth_nm)), 2);
 
-        let ringing = grid.is_dense().then(|| Ringing::new(&friction_nm, friction_noise_nm));
+        let ringing = if grid.is_dense() { Ringing::new(&friction_nm, friction_noise_nm) } else { None };
         let mut usable = grid.covered.clone();
         // The observer's first state is a guess.
         usable.iter_mut().take(5).for_each(|u| *u = false);

@@ -13,7 +13,7 @@
 //! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
 //! Left out: what the force did between samples; slip that begins and ends within one.
 
-use super::law::{Contact, Curve};
+use super::law::Contact;
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Slip is faster than so many deviations of its noise.
@@ -44,8 +44,8 @@ pub struct Drive<'a> {
     pub load_n: &'a [f64],
     /// Measured friction force with the sensor taken off, N.
     pub force_n: &'a [f64],
-    /// m(t) of the friction coefficient's factor e^m, where something changes it.
-    pub log_factor: Option<&'a [f64]>,
+    /// Factor of the friction coefficient, where something changes it.
+    pub factor: Option<&'a [f64]>,
     /// Slip speed that counts as slip, m/s.
     pub slip_threshold_m_s: f64,
     /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
@@ -85,11 +85,14 @@ pub(super) fn least_load_n(drive: &Drive<'_>) -> f64 {
     LEAST_LOAD * drive.load_n.iter().copied().fold(0.0, f64::max)
 }
 
+/// Beyond this a sigmoid is 0 or 1: to 3e-7, less than [`NEGLIGIBLE`].
+const SATURATED: f64 = 15.0;
+
 #[inline]
 fn sigmoid(x: f64) -> f64 {
-    if x > 30.0 {
+    if x > SATURATED {
         1.0
-    } else if x < -30.0 {
+    } else if x < -SATURATED {
         0.0
     } else {
         1.0 / (1.0 + (-x).exp())
@@ -191,22 +194,6 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut start = SVector::<f64, 4>::zeros();
     start[0] = force[0] / k;
 
-    // First the slip speeds, each the mean between two samples; then, at the samples, the law.
-    let mut states = vec![start; n];
-    for i in 1..n {
-        let mut state = states[i - 1];
-        block.step(&mut state, force, i);
-        let moved = drive.root_m[i] - drive.root_m[i - 1] - (state[0] - states[i - 1][0]);
-        out.sliding[i] = moved / dt;
-        states[i] = state;
-    }
-    for i in 1..n {
-        // Even about the sample: means before and after it, so that the law is not late by half a step.
-        let at = |i: usize| out.sliding[i.clamp(1, n - 1)];
-        out.slip_m_s[i] = 0.5 * (at(i) + at(i + 1));
-    }
-
-    let (per_log, log_slowest) = Curve::scale_of_table();
     let coulomb = contact.curve.at_speed();
     let least_load = least_load_n(drive);
     // The force's noise passes to the slip through the block: n/c, or n/(k h) where there is no damper.
@@ -215,15 +202,26 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let creep_noise = drive.noise.0.hypot(slip_noise);
     let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
+    // One sample ahead, so that the slip is even about each: means before and after it, or the law is late by half a step.
+    let after = |state: &SVector<f64, 4>, i: usize| {
+        let mut next = *state;
+        block.step(&mut next, force, i);
+        (next, (drive.root_m[i] - drive.root_m[i - 1] - (next[0] - state[0])) / dt)
+    };
+    let (mut next, mut slips_next) = after(&start, 1);
     let mut held = start;
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     out.force_n[0] = force[0];
     for i in 1..n {
-        let observed = states[i];
+        let (observed, slipped) = (next, slips_next);
+        if i + 1 < n {
+            (next, slips_next) = after(&observed, i + 1);
+        }
         let way = drive.root_m[i] - drive.root_m[i - 1];
         let v = 0.5 * (way + drive.root_m[(i + 1).min(n - 1)] - drive.root_m[i.min(n - 2)]) / dt;
-        let w = out.slip_m_s[i];
+        let w = 0.5 * (slipped + slips_next);
+        out.slip_m_s[i] = w;
         let speed = w.abs();
         let load = drive.load_n[i];
         if load <= least_load {
@@ -232,19 +230,23 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             out.sliding[i] = 1.0;
             continue;
         }
-        let mut loaded = drive.log_factor.map_or(load, |m| load * m[i].exp());
+        let mut loaded = drive.factor.map_or(load, |factor| load * factor[i]);
         if let Some(ageing) = contact.ageing {
             loaded *= ageing.factor(age);
         }
         let sign = if w > 0.0 { 1.0 } else { -1.0 };
         let resisting = sign * force[i] / (load * coulomb);
-        let slips = sigmoid((speed / threshold - 1.0) / WIDTH)
-            * sigmoid((speed / (v.abs() + 1e-3 * threshold) / LEAST_SHARE - 1.0) / WIDTH)
-            * sigmoid((resisting / LEAST_FORCE - 1.0) / WIDTH);
+        let fast = sigmoid((speed / threshold - 1.0) / WIDTH);
+        let slips = if fast > 0.0 {
+            fast * sigmoid((speed / (v.abs() + 1e-3 * threshold) / LEAST_SHARE - 1.0) / WIDTH)
+                * sigmoid((resisting / LEAST_FORCE - 1.0) / WIDTH)
+        } else {
+            0.0
+        };
         out.sliding[i] = slips;
 
         let sliding = if slips > NEGLIGIBLE {
-            sign * (loaded * contact.curve.at(speed, per_log, log_slowest) + (per_load * load + film) * speed)
+            sign * (loaded * contact.curve.at(speed) + (per_load * load + film) * speed)
         } else {
             0.0
         };
@@ -257,18 +259,19 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
             // Slower than what counts as slip it is friction at the slip's speed, its noise taken off.
             let creep = (speed * speed - creep_noise * creep_noise).max(0.0).sqrt();
-            let limit = loaded * contact.curve.at(creep, per_log, log_slowest);
-            let towards = sigmoid((sticking.signum() * v / (0.1 * threshold) - 1.0) / WIDTH);
+            let limit = loaded * contact.curve.at(creep);
             let over = (sticking.abs() - limit) / (LIMIT_WIDTH * limit);
-            let beyond = if over > 30.0 {
-                sticking.abs() - limit
-            } else if over < -30.0 {
-                0.0
-            } else {
-                LIMIT_WIDTH * limit * over.exp().ln_1p()
-            };
-            let breaks = sigmoid(over) * towards;
-            sticking -= sticking.signum() * beyond * towards;
+            let mut breaks = 0.0;
+            if over > -SATURATED {
+                let towards = sigmoid((sticking.signum() * v / (0.1 * threshold) - 1.0) / WIDTH);
+                let beyond = if over > SATURATED {
+                    sticking.abs() - limit
+                } else {
+                    LIMIT_WIDTH * limit * over.exp().ln_1p()
+                };
+                breaks = sigmoid(over) * towards;
+                sticking -= sticking.signum() * beyond * towards;
+            }
             let pulled = gain * (force[i] - sticking) / k;
             let follows = slips + (1.0 - slips) * breaks;
             held[0] = follows * observed[0] + (1.0 - follows) * (held[0] + moved + pulled);
@@ -291,6 +294,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::contact::law::Curve;
     use crate::identify::noise::White;
 
     /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
@@ -320,7 +324,7 @@ mod tests {
                 root_m: &root_m,
                 load_n: &[10.0; 1000],
                 force_n: &force_n,
-                log_factor: None,
+                factor: None,
                 slip_threshold_m_s: 1e-4,
                 noise: (1e-5, 0.15),
             };

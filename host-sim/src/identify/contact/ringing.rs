@@ -47,8 +47,8 @@ fn alternated(values: &[f64]) -> Vec<f64> {
 }
 
 impl Ringing {
-    /// In a channel with white noise of this deviation.
-    pub(super) fn new(channel: &[f64], noise: f64) -> Self {
+    /// In a channel with white noise of this deviation; `None` where nothing swings.
+    pub(super) fn new(channel: &[f64], noise: f64) -> Option<Self> {
         // Turned by half a cycle a sample, what is fast is slow.
         let fast = gaussian(&alternated(channel), FAST, 0);
         let own = |lag: usize| -> Vec<f64> {
@@ -71,8 +71,8 @@ impl Ringing {
             let energy = 2.0 * over / passed;
             ([cosine, angle.sin()].map(|x| x * (1.0 - RENEWED).sqrt()), 0.5 * RENEWED * energy)
         });
-        let (rotations, strikes) = each.unzip();
-        Self { rotations, strikes }
+        let (rotations, strikes): (_, Vec<f64>) = each.unzip();
+        strikes.iter().any(|strike| *strike > 0.0).then_some(Self { rotations, strikes })
     }
 
     /// Kalman's gains where each sample's own noise has this variance; what is not used tells nothing.
@@ -148,7 +148,8 @@ mod tests {
     /// Innovations, and those over their deviations.
     fn filtered(shown: &[f64], torque: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let variance = vec![NOISE * NOISE; shown.len()];
-        let filter = Ringing::new(shown, NOISE).filter(&variance, &vec![true; shown.len()]);
+        let filter =
+            Ringing::new(shown, NOISE).expect("it swings").filter(&variance, &vec![true; shown.len()]);
         let mut innovations: Vec<f64> = shown.iter().zip(torque).map(|(y, x)| y - x).collect();
         filter.innovations(&mut innovations);
         let over =

@@ -40,19 +40,17 @@ const FINALISTS: usize = 8;
 const WORTH: f64 = 0.5 * MODEL_FORM;
 /// −ln posterior by which a point has to be better than a known optimum to be another valley's: what a fit leaves undone.
 const NO_WORSE: f64 = 0.5;
+/// Iterations of a set that is fitted from where it stood with one cause more.
+const SUBSET_ITERATIONS: usize = 8;
 /// Sets whose subsets stay in the comparison, so that what a cause adds is seen beside the same others.
 const CLOSED: usize = 3;
 
 /// How much the prediction changes, relative to the signal, when each of a set's terms is taken out and the others are
 /// fitted again, where that set is not among those that are.
-pub fn sizes<'f>(
-    problem: &Problem<'_>,
-    fit: &Fit,
-    fitted: impl Iterator<Item = &'f Fit> + Clone + Sync,
-) -> Vec<f64> {
-    changes(problem, fit, &|left| match fitted.clone().find(|known| same_set(&known.terms, &left.terms)) {
+pub fn sizes(problem: &Problem<'_>, fit: &Fit, fitted: &[&Fit]) -> Vec<f64> {
+    changes(problem, fit, &|left| match fitted.iter().find(|known| same_set(&known.terms, &left.terms)) {
         Some(known) => known.r.clone(),
-        None => problem.fit(&left.terms, left.p, 8, None).r,
+        None => problem.fit(&left.terms, left.p, SUBSET_ITERATIONS, None).r,
     })
 }
 
@@ -66,6 +64,22 @@ fn changes(problem: &Problem<'_>, fit: &Fit, left: &(dyn Fn(Fit) -> Vec<f64> + S
         .into_par_iter()
         .map(|out| difference(problem, &fit.r, &left(without(problem, fit, out))))
         .collect()
+}
+
+/// The sets that are left where one cause of these is taken out and that none of `fitted` is, each fitted once.
+pub fn subsets<'f>(problem: &Problem<'_>, sets: impl Iterator<Item = &'f Fit>, fitted: &[&Fit]) -> Vec<Fit> {
+    let mut missing: Vec<Fit> = Vec::new();
+    for set in sets {
+        for out in 0..set.terms.len() {
+            let left = without(problem, set, out);
+            let mut known = fitted.iter().copied().chain(&missing);
+            if !known.any(|fit| same_set(&fit.terms, &left.terms)) {
+                missing.push(left);
+            }
+        }
+    }
+    let fit = |left: Fit| problem.fit(&left.terms, left.p, SUBSET_ITERATIONS, None);
+    missing.into_par_iter().map(fit).collect()
 }
 
 /// RMS of the difference of two predictions over that of the signal, where the channel is well known.
@@ -99,8 +113,9 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
     let mut parents: Vec<Fit> = singles.into_iter().take(PARENTS).collect();
     for what in ["pairs of causes", "three causes at once"] {
         // A set whose parts are too small to matter has no larger one worth a search.
-        let worth =
-            parents.first().is_some_and(|best| sizes(problem, best, all.iter()).iter().all(|s| *s > WORTH));
+        let worth = parents.first().is_some_and(|best| {
+            sizes(problem, best, &all.iter().collect::<Vec<_>>()).iter().all(|s| *s > WORTH)
+        });
         if !worth {
             break;
         }
@@ -110,7 +125,7 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
         all.extend(children.into_iter().take(FINALISTS));
     }
     progress("evidence");
-    let mut ranked = rank(problem, all);
+    let mut ranked = rank(problem, Vec::new(), all);
     for _ in 0..2 {
         let refitted_to = ranked[0].fit.terms.clone();
         problem.noise.refit(problem.logs, &ranked[0].fit.r);
@@ -128,7 +143,7 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
         }
         let again: Vec<Fit> =
             kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 6, None)).collect();
-        ranked = rank(problem, again);
+        ranked = rank(problem, Vec::new(), again);
         ranked = closed(problem, ranked);
         // The noise is that of the answer.
         if same_set(&ranked[0].fit.terms, &refitted_to) {
@@ -170,8 +185,9 @@ fn closed(problem: &Problem<'_>, mut ranked: Vec<Ranked>) -> Vec<Ranked> {
         if missing.is_empty() {
             break;
         }
-        let fits: Vec<Fit> = missing.into_par_iter().map(|s| problem.fit(&s.terms, s.p, 8, None)).collect();
-        ranked = rank(problem, ranked.into_iter().map(|r| r.fit).chain(fits).collect());
+        let fits: Vec<Fit> =
+            missing.into_par_iter().map(|s| problem.fit(&s.terms, s.p, SUBSET_ITERATIONS, None)).collect();
+        ranked = rank(problem, ranked, fits);
     }
     ranked
 }
@@ -197,19 +213,16 @@ pub fn baseline(problem: &Problem<'_>) -> Fit {
     problem.fit(&[], near.p, 6, None)
 }
 
+/// Of each set the fit that costs least, the least first.
 fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let mut seen: Vec<Vec<usize>> = Vec::new();
-    fits.retain(|fit| {
-        let mut terms = fit.terms.clone();
-        terms.sort_unstable();
-        let new = !seen.contains(&terms);
-        if new {
-            seen.push(terms);
+    let mut kept: Vec<Fit> = Vec::new();
+    for fit in fits {
+        if !kept.iter().any(|known| same_set(&known.terms, &fit.terms)) {
+            kept.push(fit);
         }
-        new
-    });
-    fits
+    }
+    kept
 }
 
 fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]) -> Vec<Fit> {
@@ -407,10 +420,15 @@ fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) ->
     improved(problem, first, &[(6, 5)])
 }
 
-fn rank(problem: &Problem<'_>, fits: Vec<Fit>) -> Vec<Ranked> {
-    let fits = unique(fits);
-    let mut ranked: Vec<Ranked> =
-        fits.into_par_iter().map(|fit| Ranked { log_evidence: problem.log_evidence(&fit)[1], fit }).collect();
+/// All of these sets with their evidence, best first; of those that were ranked under the same noise it is known.
+fn rank(problem: &Problem<'_>, mut ranked: Vec<Ranked>, fits: Vec<Fit>) -> Vec<Ranked> {
+    let mut fits = unique(fits);
+    let better = |a: &Fit, b: &Fit| same_set(&a.terms, &b.terms) && a.cost < b.cost;
+    ranked.retain(|known| !fits.iter().any(|fit| better(fit, &known.fit)));
+    fits.retain(|fit| !ranked.iter().any(|known| same_set(&known.fit.terms, &fit.terms)));
+    ranked.par_extend(
+        fits.into_par_iter().map(|fit| Ranked { log_evidence: problem.log_evidence(&fit)[1], fit }),
+    );
     ranked.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     ranked
 }
