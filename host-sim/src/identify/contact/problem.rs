@@ -509,13 +509,10 @@ impl<'a> Problem<'a> {
                 }
                 let lower: Vec<f64> = parameters.iter().zip(&p).map(|(q, x)| q.lower - x).collect();
                 let d = linear::solve_bounded(&damped, &g, &lower);
-                let excess = d.iter().zip(&parameters).map(|(d, q)| d.abs() / q.reach).fold(1.0, f64::max);
-                let next: Vec<f64> = p
-                    .iter()
-                    .zip(d.iter())
-                    .zip(&parameters)
-                    .map(|((p, d), q)| (p + d / excess).max(q.lower))
-                    .collect();
+                // Each as far as slopes are good for: one that wants to go further does not hold the others.
+                let moved = p.iter().zip(d.iter()).zip(&parameters);
+                let next: Vec<f64> =
+                    moved.map(|((p, d), q)| (p + d.clamp(-q.reach, q.reach)).max(q.lower)).collect();
                 let next_r = self.residuals(terms, &next);
                 let next_cost = self.cost(terms, &next, &next_r);
                 if next_cost < cost {

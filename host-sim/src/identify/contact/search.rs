@@ -42,6 +42,10 @@ const WORTH: f64 = 0.5 * MODEL_FORM;
 const NO_WORSE: f64 = 0.5;
 /// Iterations of a set that is fitted from where it stood with one cause more.
 const SUBSET_ITERATIONS: usize = 8;
+/// Iterations of a larger set from where its parent stood, with its parent's slopes.
+const FIRST_STEPS: usize = 5;
+/// Iterations of a law that takes its columns' place.
+const BENDING: usize = 5;
 /// Sets whose subsets stay in the comparison, so that what a cause adds is seen beside the same others.
 const CLOSED: usize = 3;
 
@@ -269,25 +273,11 @@ fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>)
 pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
     let mut current = fit.clone();
     for place in 0..fit.terms.len() {
-        let term = current.terms[place];
-        let effect = problem.terms[term].effect;
-        if problem.terms[term].export.is_some()
-            && (problem.terms[term].law || problem.terms[term].columns.is_none())
-        {
+        let term = &problem.terms[current.terms[place]];
+        if term.export.is_some() && (term.law || term.columns.is_none()) {
             continue;
         }
-        let Some(law) =
-            (0..problem.terms.len()).find(|t| problem.terms[*t].law && problem.terms[*t].effect == effect)
-        else {
-            continue;
-        };
-        // Out with the columns, in with the law, at the end of the parameters.
-        let others = without(problem, &current, place);
-        let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
-        let starts = problem.starts(&others, law);
-        let fits =
-            starts.into_par_iter().map(|s| problem.fit(&terms, [others.p.as_slice(), &s].concat(), 8, None));
-        if let Some(best) = fits.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
+        if let Some(best) = with_law(problem, &current, place, SUBSET_ITERATIONS) {
             // The places of the others have moved by one: the law stands last.
             current = problem.settled(best);
             return as_laws(problem, &current);
@@ -296,12 +286,37 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
     current
 }
 
+/// A set with the law of an effect, at the end, in place of the form of it that stands at a place.
+fn with_law(problem: &Problem<'_>, fit: &Fit, place: usize, iterations: usize) -> Option<Fit> {
+    let effect = problem.terms[fit.terms[place]].effect;
+    let law = problem.terms.iter().position(|term| term.law && term.effect == effect)?;
+    let others = without(problem, fit, place);
+    let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
+    let starts = problem.starts(&others, law).into_par_iter();
+    let fits =
+        starts.map(|start| problem.fit(&terms, [others.p.as_slice(), &start].concat(), iterations, None));
+    fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// With the best set's laws in place of its columns, one at a time: beside another cause a law may bend as a law that stood
+/// alone had no reason to.
+fn bent(problem: &Problem<'_>, mut fits: Vec<Fit>) -> Vec<Fit> {
+    let Some(best) = fits.first() else { return fits };
+    let columns = |place: &usize| !problem.terms[best.terms[*place]].law;
+    let places: Vec<usize> = (0..best.terms.len()).filter(columns).collect();
+    let laws: Vec<Fit> =
+        places.into_par_iter().filter_map(|place| with_law(problem, best, place, BENDING)).collect();
+    fits.extend(laws);
+    unique(fits)
+}
+
 /// Linearised gain in evidence of each term beside a fit, with the values at which it starts.
 fn table(
     problem: &Problem<'_>,
     parent: &Fit,
     slopes: &Slopes,
     known: &[Option<Points>],
+    afresh: bool,
 ) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
     let w = problem.weights(&parent.r);
@@ -321,8 +336,11 @@ fn table(
                 let j = problem.term_columns(slopes, &terms, &p, &parent.r);
                 (j, Vec::new())
             } else {
-                // A grid is gone through once, beside the baseline; then only near what was best there.
-                let starts = known[term].clone().unwrap_or_else(|| problem.starts(parent, term));
+                // A grid is gone through beside the baseline and beside the best set; else only near what was best there.
+                let starts = match &known[term] {
+                    Some(points) if !afresh => points.clone(),
+                    points => [points.clone().unwrap_or_default(), problem.starts(parent, term)].concat(),
+                };
                 let columns = starts
                     .iter()
                     .map(|start| {
@@ -344,38 +362,43 @@ fn table(
         all.extend(columns.iter().cloned());
     }
     let (h, g) = normal_equations(&all, &w, &parent.r);
-    let gain = |columns: &[usize], sd: &dyn Fn(usize) -> f64| -> (f64, DVector<f64>) {
+    // `prior` of the added columns: deviation and lower bound.
+    let gain = |columns: &[usize], prior: &dyn Fn(usize) -> (f64, f64)| -> f64 {
         let index: Vec<usize> = (0..base_count).chain(columns.iter().copied()).collect();
-        let width = |i: usize| if i < base_count { parameters[i].sd } else { sd(index[i]) };
+        let (width, lower): (Vec<f64>, Vec<f64>) = index
+            .iter()
+            .map(|i| if *i < base_count { (parameters[*i].sd, f64::NEG_INFINITY) } else { prior(*i) })
+            .unzip();
         let a = DMatrix::from_fn(index.len(), index.len(), |i, j| {
-            h[(index[i], index[j])] * width(i) * width(j) + f64::from(u8::from(i == j))
+            h[(index[i], index[j])] * width[i] * width[j] + f64::from(u8::from(i == j))
         });
         let b = DVector::from_fn(index.len(), |i, _| {
             let off =
-                if i < base_count { (parent.p[i] - parameters[i].mean) / (width(i) * width(i)) } else { 0.0 };
-            (g[index[i]] - off) * width(i)
+                if i < base_count { (parent.p[i] - parameters[i].mean) / (width[i] * width[i]) } else { 0.0 };
+            (g[index[i]] - off) * width[i]
         });
-        let factor = linear::factor(&a);
-        let x = factor.solve(&b);
-        let d = DVector::from_fn(index.len(), |i, _| x[i] * width(i));
-        (0.5 * b.dot(&x) - 0.5 * linear::log_determinant(&factor), d)
+        let lower: Vec<f64> = lower.iter().zip(&width).map(|(lower, width)| lower / width).collect();
+        let x = linear::solve_bounded(&a, &b, &lower);
+        b.dot(&x) - 0.5 * x.dot(&(&a * &x)) - 0.5 * linear::log_determinant(&linear::factor(&a))
     };
-    let none = gain(&[], &|_| 1.0).0;
+    let none = gain(&[], &|_| (1.0, f64::NEG_INFINITY));
     for ((&term, (_, starts)), place) in others.iter().zip(&blocks).zip(places) {
         let q = &problem.terms[term];
         if starts.is_empty() {
             let columns: Vec<usize> = place.clone().collect();
-            let sd = |scale: f64| move |i: usize| q.parameters[i - place.start].sd * scale;
-            let tried: Vec<(f64, DVector<f64>)> = SCALES.iter().map(|s| gain(&columns, &sd(*s))).collect();
-            let value = log_mean_exp(tried.iter().map(|t| t.0)) - none;
-            let best = tried.iter().max_by(|a, b| a.0.total_cmp(&b.0)).expect("there are scales");
-            let sizes = best.1.rows(base_count, q.parameters.len());
-            let over = sizes.iter().zip(&q.parameters).map(|(x, p)| x.abs() / p.sd).fold(1.0, f64::max);
-            let start = sizes.iter().zip(&q.parameters).map(|(x, p)| (x / over).max(p.lower)).collect();
-            out.push((value, term, vec![start]));
+            let prior = |scale: f64| {
+                move |i: usize| {
+                    let own = &q.parameters[i - place.start];
+                    (own.sd * scale, own.lower)
+                }
+            };
+            let value = log_mean_exp(SCALES.iter().map(|s| gain(&columns, &prior(*s)))) - none;
+            // The first step of its fit is what this table says, held to what lowers the cost.
+            out.push((value, term, vec![vec![0.0; q.parameters.len()]]));
         } else {
             // Each point is a direction of its own.
-            let tried = place.zip(starts).map(|(i, start)| (gain(&[i], &|_| 1.0).0 - none, start.clone()));
+            let free = |_| (1.0, f64::NEG_INFINITY);
+            let tried = place.zip(starts).map(|(i, start)| (gain(&[i], &free) - none, start.clone()));
             let mut tried: Vec<(f64, Vec<f64>)> = tried.collect();
             tried.sort_by(|a, b| b.0.total_cmp(&a.0));
             let value = tried.first().map_or(f64::NEG_INFINITY, |t| t.0);
@@ -389,9 +412,9 @@ fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) ->
     let slopes: Vec<Slopes> =
         parents.iter().map(|parent| problem.slopes(&parent.terms, &parent.p, &parent.r)).collect();
     let mut candidates: Vec<(f64, Vec<usize>, (&Slopes, Points))> = Vec::new();
-    for (parent, slopes) in parents.iter().zip(&slopes) {
+    for (place, (parent, slopes)) in parents.iter().zip(&slopes).enumerate() {
         let [level, _] = problem.log_evidence(parent);
-        for (gain, term, starts) in table(problem, parent, slopes, known) {
+        for (gain, term, starts) in table(problem, parent, slopes, known, place == 0) {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
             let starts = starts.into_iter().map(|s| [parent.p.as_slice(), &s].concat()).collect();
             candidates.push((level + gain, terms, (slopes, starts)));
@@ -415,9 +438,9 @@ fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) ->
         .collect();
     let first: Vec<Fit> = starts
         .into_par_iter()
-        .map(|(terms, slopes, start)| problem.fit(&terms, start, 2, Some(slopes)))
+        .map(|(terms, slopes, start)| problem.fit(&terms, start, FIRST_STEPS, Some(slopes)))
         .collect();
-    improved(problem, first, &[(6, 5)])
+    bent(problem, improved(problem, first, &[(6, 5)]))
 }
 
 /// All of these sets with their evidence, best first; of those that were ranked under the same noise it is known.
