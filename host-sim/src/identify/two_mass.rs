@@ -32,8 +32,10 @@ const RECKONED: [f64; 4] = [0.3, 0.1, 0.03, 0.005];
 const SLOWER_THAN_MODE: f64 = 0.5;
 /// Points of the grid from which a fit starts, its iterations, and step and longest move of the logarithms.
 const STARTS: usize = 3;
-const ITERATIONS: usize = 12;
+const ITERATIONS: usize = 20;
 const STEP: f64 = 0.01;
+/// The same where there is play: the instants at which it closes make the likelihood rough over less.
+const STEP_OVER_PLAY: f64 = 0.05;
 const REACH: f64 = 0.4;
 /// Modes that the balance's filter lets through, Hz.
 const HERTZ: [f64; 2] = [4.0, 150.0];
@@ -315,6 +317,7 @@ fn refined(
     let scaled = |solved: &Solved| -> Vec<f64> {
         balance.used.iter().map(|&i| solved.residual[i] / balance.deviation[i]).collect()
     };
+    let step = if start.numbers.gap_rad > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
     let mut log_occam = None;
     let mut damping = 1e-2;
@@ -331,7 +334,7 @@ fn refined(
                     Some(scaled(&there.solved).iter().zip(&r).map(|(a, b)| (b - a) / step).collect())
                 };
                 // At the end of what is allowed the other way.
-                moved(STEP).or_else(|| moved(-STEP))
+                moved(step).or_else(|| moved(-step))
             })
             .collect();
         let Some(columns) = columns else { break };

@@ -18,10 +18,12 @@ impl Effect for Backlash {
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let mut grid = Vec::new();
-        for (mode_hz, disc_share) in [(40.0, 0.35), (40.0, 0.65), (80.0, 0.35), (80.0, 0.65)] {
-            for damping_ratio in [0.05, 0.2] {
-                let of_gap = |gap_rad| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad };
-                grid.extend([0.003, 0.01, 0.03, 0.05, 0.08].map(of_gap));
+        for mode_hz in [34.0, 48.0, 68.0] {
+            for disc_share in [0.35, 0.55, 0.75] {
+                for damping_ratio in [0.05, 0.2] {
+                    let of_gap = |gap_rad| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad };
+                    grid.extend([0.003, 0.006, 0.012, 0.025, 0.05, 0.1].map(of_gap));
+                }
             }
         }
         alternative_of_grid("backlash", view, grid).into_iter().collect()
