@@ -38,17 +38,19 @@ impl Effect for ThermalFade {
     }
 }
 
-/// Slow node: its fade relative to the fast one's, its time over the fast one's.
-fn values(p: &[f64], usual_w: f64) -> [f64; 6] {
+/// Slow node: its fade relative to the fast one's, its time over the fast one's. Both cool within the longest log, s: heat that
+/// does not is all the energy ever dissipated, which no log tells from the distance that was slid.
+fn values(p: &[f64], usual_w: f64, longest_s: f64) -> [f64; 6] {
     let within = |x: f64, low: f64, high: f64| x.exp().clamp(low, high);
-    let (fade, time_s) = (within(p[0], 0.0, 1e3) / usual_w, within(p[1], 0.05, 1e3));
-    let slow_s = (time_s * within(p[3], 1.5, 1e3)).min(1e4);
+    let (fade, time_s) = (within(p[0], 0.0, 1e3) / usual_w, within(p[1], 0.05, longest_s.max(0.1)));
+    let slow_s = (time_s * within(p[3], 1.5, 1e3)).min(1.5 * longest_s);
     [fade.min(10.0), time_s, (fade * within(p[2], 0.0, 1e3)).min(10.0), slow_s, within(p[4], 0.0, 100.0), within(p[5], 0.2, 5.0)]
 }
 
 fn law(id: &'static str, view: &ContactView<'_>) -> ContactTerm {
     let power: Vec<(f64, Vec<f64>)> =
         view.logs.iter().zip(view.coordinates).map(|(log, c)| (log.grid.step_s, c.power_w.clone())).collect();
+    let longest_s = view.scales.time_s;
     let usual_w = view.scales.heat_j[0] / HEAT_TIMES_S[0];
     let parameters = vec![
         // Fade in a second of the largest power; the slow node fades a tenth as much and cools ten times slower.
@@ -63,7 +65,7 @@ fn law(id: &'static str, view: &ContactView<'_>) -> ContactTerm {
         .map(|t: f64| [0.02, 0.1].map(|f: f64| vec![f.ln(), t.ln(), 0.1f64.ln(), 10f64.ln(), 0.7f64.ln(), 0.0]))
         .concat();
     let act = move |p: &[f64], change: &mut super::Change| {
-        let values = values(p, usual_w);
+        let values = values(p, usual_w, longest_s);
         let Ok(law) = Law::new(&values) else { return };
         let of = |(step_s, power): &(f64, Vec<f64>)| -> Vec<f64> {
             let (fast, slow) = (held(power, *step_s, values[1]), held(power, *step_s, values[3]));
@@ -72,6 +74,6 @@ fn law(id: &'static str, view: &ContactView<'_>) -> ContactTerm {
         change.add_log_factor(&[power.iter().map(of).collect()], &[1.0]);
     };
     ContactTerm::any(id, parameters, Starts::BestOf(starts, 2), act).as_law().exported(move |p, _| {
-        Law::<f64>::NAMES.iter().map(ToString::to_string).zip(values(p, usual_w)).collect()
+        Law::<f64>::NAMES.iter().map(ToString::to_string).zip(values(p, usual_w, longest_s)).collect()
     })
 }
