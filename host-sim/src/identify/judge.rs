@@ -16,7 +16,7 @@ use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
 use super::effects::{ContactView, DriveView, LIBRARY, NormalLoadView};
-use super::law_form::LAW_FORM;
+use super::law_form::{LAW_FORM, SHAPE_FORM};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Rest};
 use crate::files::log::{Log, LogKind};
@@ -73,6 +73,8 @@ pub struct Candidate {
     pub place: usize,
     /// Change of the prediction by each effect, relative to the signal, in the order of `effects`.
     pub sizes: Vec<f64>,
+    /// Share of its size that each effect's form here may be wrong by, in the order of `effects`.
+    pub forms: Vec<f64>,
     /// What a change has to exceed, relative to the signal: what the form of the model is known to, and what is left.
     pub floor: f64,
 }
@@ -228,6 +230,7 @@ impl Linear {
                 log_evidence: solved.log_evidence,
                 place,
                 sizes: effects.iter().map(|e| e.1).collect(),
+                forms: vec![LAW_FORM; effects.len()],
                 floor: MODEL_FORM
                     .max(LEFT_SHARE * self.rest(place).size * self.balance.scale / self.signal.max(1e-12)),
             });
@@ -531,14 +534,22 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
     let mut out = Vec::new();
     for (place, (ranked, sizes)) in contact.ranked.iter().zip(&contact.sizes).enumerate() {
         let fit = &ranked.fit;
-        let names = fit.terms.iter().map(|t| contact.terms[*t].effect);
-        let mut effects: Vec<(&'static str, f64)> = names.zip(sizes.iter().copied()).collect();
+        // A sum of columns finds its shape, a law has one.
+        let of_term = |term: &usize| {
+            let term = &contact.terms[*term];
+            let shaped = term.parameters.iter().all(|p| p.amplitude);
+            (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
+        };
+        let terms = fit.terms.iter().map(of_term).zip(sizes);
+        let mut effects: Vec<(&'static str, f64, f64)> =
+            terms.map(|((effect, form), size)| (effect, *size, form)).collect();
         effects.sort_by_key(|e| e.0);
         out.push(Candidate {
             effects: effects.iter().map(|e| e.0).collect(),
             log_evidence: ranked.log_evidence,
             place,
             sizes: effects.iter().map(|e| e.1).collect(),
+            forms: effects.iter().map(|e| e.2).collect(),
             floor: MODEL_FORM.max(LEFT_SHARE * ground.size(&problem, fit)),
         });
     }
@@ -581,11 +592,12 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
                 places.push((*part, best.place));
                 for (own, (effect, size)) in best.effects.iter().zip(&best.sizes).enumerate() {
                     let at = effects.iter().position(|e| e == effect)?;
-                    let others = best.sizes.iter().enumerate().filter(|(other, _)| *other != own);
-                    let largest = others.map(|(_, size)| *size).fold(0.0, f64::max);
+                    let others =
+                        best.sizes.iter().zip(&best.forms).enumerate().filter(|(other, _)| *other != own);
+                    let wrong_by = others.map(|(_, (size, form))| size * form).fold(0.0, f64::max);
                     sizes[at] = sizes[at].max(*size);
                     // What a second cause adds may be the first one's form.
-                    over_floor[at] = over_floor[at].max(*size / best.floor.max(LAW_FORM * largest));
+                    over_floor[at] = over_floor[at].max(*size / best.floor.max(wrong_by));
                 }
             }
             Some(Hypothesis { effects, log_weight, places, sizes, over_floor, probability: 0.0 })
@@ -602,16 +614,29 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
         too_small.push(TooSmall { effect, size, floor: size / over.max(1e-12) });
         all.retain(|h| !h.effects.contains(&effect));
     }
-    // Two sets with the same effects in use are one.
     let top = all.first().map_or(0.0, |h| h.log_weight);
-    let mut mass = 0.0;
-    for h in &mut all {
-        h.probability =
-            (h.log_weight - top).exp() * h.over_floor.iter().map(|over| real(*over)).product::<f64>();
-        mass += h.probability;
-    }
-    all.iter_mut().for_each(|h| h.probability /= mass.max(1e-300));
+    all.iter_mut().for_each(|h| h.probability = (h.log_weight - top).exp());
+    let mass: f64 = all.iter().map(|h| h.probability).sum();
+    all.iter_mut().for_each(|h| h.probability /= mass);
+    hand_down(&mut all);
     (all, too_small)
+}
+
+/// As far as an effect of a set may be the model's form, the set without it has its probability: the largest sets first.
+fn hand_down(all: &mut [Hypothesis]) {
+    for size in (1..=MOST_CAUSES).rev() {
+        for at in (0..all.len()).filter(|at| all[*at].effects.len() == size).collect::<Vec<_>>() {
+            let doubted = all[at].over_floor.iter().map(|over| 1.0 - real(*over)).enumerate();
+            let Some((effect, doubt)) = doubted.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+            let mut left = all[at].effects.clone();
+            left.remove(effect);
+            if let Some(without) = all.iter().position(|h| h.effects == left) {
+                let handed = doubt * all[at].probability;
+                all[at].probability -= handed;
+                all[without].probability += handed;
+            }
+        }
+    }
 }
 
 /// Coordinates of the contact with their units, all logs on end: what residuals are drawn over.

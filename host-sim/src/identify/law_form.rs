@@ -6,10 +6,15 @@
 /// Share of a cause's size that its law may be wrong by: the RMS over laws of growth and of decay from the literature, each
 /// fitted by each other in amplitude and scale (the test computes it: 0.05 and 0.16).
 pub(super) const LAW_FORM: f64 = 0.1;
+/// The same where the shape is found, as a sum of columns: what three of them leave of the laws of growth.
+pub(super) const SHAPE_FORM: f64 = 0.01;
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
+    use crate::identify::linear;
 
     type Law = fn(f64) -> f64;
 
@@ -65,5 +70,22 @@ mod tests {
         let both = (0.5 * (growth * growth + decay * decay)).sqrt();
         // To one digit: it is a prior of what the next rubber's law is.
         assert!(((both * 10.0).round() / 10.0 - LAW_FORM).abs() < 1e-12, "{both}");
+    }
+
+    #[test]
+    fn it_is_what_columns_leave_of_published_laws() {
+        const BENDS: [f64; 3] = [0.05, 0.2, 1.0];
+        let xs: Vec<f64> = (0..=SAMPLES).map(|n| f64::from(n) / f64::from(SAMPLES)).collect();
+        let columns = DMatrix::from_fn(xs.len(), BENDS.len(), |i, j| 1.0 - (-xs[i] / BENDS[j]).exp());
+        let mut squares = Vec::new();
+        for range in [1.0, 3.0] {
+            for law in GROWTH {
+                let y = DVector::from_fn(xs.len(), |i, _| law(range * xs[i]));
+                let p = linear::non_negative(&(columns.transpose() * &columns), &(columns.transpose() * &y));
+                squares.push((&y - &columns * p).norm_squared() / y.norm_squared());
+            }
+        }
+        let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        assert!(((rms * 100.0).round() / 100.0 - SHAPE_FORM).abs() < 1e-12, "{rms}");
     }
 }
