@@ -724,3 +724,28 @@ impl Judgement {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_may_be_a_form_is_the_set_without_it() {
+        let set = |effects: &[&'static str], over_floor: &[f64], probability: f64| Hypothesis {
+            effects: effects.to_vec(),
+            log_weight: 0.0,
+            places: Vec::new(),
+            sizes: vec![0.1; effects.len()],
+            over_floor: over_floor.to_vec(),
+            probability,
+        };
+        // The second cause is as large as the first one's form may be wrong by: even odds, however sure its evidence is.
+        let mut all = [set(&["a", "b"], &[50.0, 1.0], 1.0), set(&["a"], &[50.0], 0.0), set(&[], &[], 0.0)];
+        hand_down(&mut all);
+        let found = all.each_ref().map(|h| h.probability);
+        assert!(
+            (found[0] - 0.5).abs() < 1e-9 && (found[1] - 0.5).abs() < 1e-9 && found[2] < 1e-9,
+            "{found:?}"
+        );
+    }
+}

@@ -142,4 +142,14 @@ mod long {
     fn a_second_leaf_is_no_ripple() {
         named(&[Effect::FoilHardening], first_with(Effect::FoilHardening, "law", "stop"), Base::Series);
     }
+
+    /// Beside the film the search has far to go, and what the ageing explains is seen only there.
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn a_film_and_ageing_are_named_together() {
+        let written = answer(&[Effect::StaticAgeing, Effect::ViscousFilm], 111_013_013, Base::Series);
+        let mut causes: Vec<&str> = written.diagnosis.causes.iter().map(|c| c.id.as_str()).collect();
+        causes.sort_unstable();
+        assert_eq!(causes, ["static_ageing", "viscous_film"], "{}", written.diagnosis.sentence);
+    }
 }
