@@ -38,14 +38,13 @@ pub struct Rest {
 
 impl Rest {
     /// Probability that it is something that the library does not have: larger than the form of a model is wrong, as large
-    /// as what a cause explains, not a trace of what the baseline leaves, and more than noise would leave that is as large as
-    /// its sources may be.
+    /// as what a cause explains, not a trace of what the baseline leaves, and more than noise leaves.
     pub fn unknown(&self) -> f64 {
         let step = |ratio: f64| 1.0 / (1.0 + (-STEEPNESS * ratio.max(1e-9).ln()).exp());
         step(self.size / (BEYOND_FORM * MODEL_FORM))
             * step(self.size / (MOST * self.explained).max(1e-12))
             * step(self.share / LEAST_SHARE)
-            * step(self.times_noise / (NAMED_WITHIN * NAMED_WITHIN - 1.0))
+            * step(self.times_noise)
     }
 }
 
