@@ -16,7 +16,7 @@ use super::contact::search;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::coordinates::{Coordinates, Scales};
 use super::effects::{ContactView, DriveView, LIBRARY, NormalLoadView};
-use super::law_form::{LAW_FORM, SHAPE_FORM};
+use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Rest};
 use crate::files::log::{Log, LogKind};
@@ -537,7 +537,7 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
         // A sum of columns finds its shape, a law has one.
         let of_term = |term: &usize| {
             let term = &contact.terms[*term];
-            let shaped = term.parameters.iter().all(|p| p.amplitude);
+            let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
             (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
         };
         let terms = fit.terms.iter().map(of_term).zip(sizes);

@@ -6,8 +6,10 @@
 /// Share of a cause's size that its law may be wrong by: the RMS over laws of growth and of decay from the literature, each
 /// fitted by each other in amplitude and scale (the test computes it: 0.05 and 0.16).
 pub(super) const LAW_FORM: f64 = 0.1;
-/// The same where the shape is found, as a sum of columns: what three of them leave of the laws of growth.
+/// The same where the shape is found, as a sum of so many columns: what they leave of the laws of growth.
 pub(super) const SHAPE_FORM: f64 = 0.01;
+/// Columns that make a shape: fewer are a law.
+pub(super) const COLUMNS: usize = 3;
 
 #[cfg(test)]
 mod tests {
@@ -74,7 +76,7 @@ mod tests {
 
     #[test]
     fn it_is_what_columns_leave_of_published_laws() {
-        const BENDS: [f64; 3] = [0.05, 0.2, 1.0];
+        const BENDS: [f64; COLUMNS] = [0.05, 0.2, 1.0];
         let xs: Vec<f64> = (0..=SAMPLES).map(|n| f64::from(n) / f64::from(SAMPLES)).collect();
         let columns = DMatrix::from_fn(xs.len(), BENDS.len(), |i, j| 1.0 - (-xs[i] / BENDS[j]).exp());
         let mut squares = Vec::new();
