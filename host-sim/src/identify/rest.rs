@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn what_noise_may_have_left_is_nothing_unknown() {
         let rest = |times_noise| Rest { size: 0.05, share: 0.3, times_noise, ..Rest::default() };
-        assert!(rest(0.7).unknown() < 0.05, "{}", rest(0.7).unknown());
+        assert!(rest(0.5).unknown() < 0.05, "{}", rest(0.5).unknown());
         assert!(rest(5.0).unknown() > 0.9, "{}", rest(5.0).unknown());
     }
 }
