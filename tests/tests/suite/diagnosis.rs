@@ -106,8 +106,9 @@ mod long {
             first_with(Effect::AdcSaturation, "channel", "friction"),
             Base::Series,
         );
-        let friction = &written.diagnosis.subsystems["friction"];
-        assert!(friction.extended.gain.unwrap() > 0.5, "{:?}", friction.extended);
+        // Not by the gain: a baseline that is fitted better makes that smaller.
+        let friction = &written.diagnosis.subsystems["friction"].extended;
+        assert!(friction.holdout_nrmse < friction.noise_floor_nrmse.map(|noise| 2.0 * noise), "{friction:?}");
         // Held-out rows whose friction torque is not known are no error of the drive.
         for log in &written.diagnosis.subsystems["drive"].holdout {
             assert!(log.baseline_nrmse < 1.5 * log.noise_floor_nrmse, "{log:?}");
