@@ -2,7 +2,7 @@
 //!
 //! 1. every form of every effect is fitted beside the baseline, a few iterations, and the best ones on;
 //! 2. at each of the best, one Gram matrix over the columns of all others gives the linearised evidence of each set with one
-//!    more; the best sets are refitted;
+//!    more; the best sets are refitted, the best of them with laws in place of its columns too;
 //! 3. the noise's sources and the effective sample size are fitted to the residuals of the best set, and the best sets
 //!    are fitted again with them.
 
