@@ -72,12 +72,22 @@ fn changes(problem: &Problem<'_>, fit: &Fit, left: &(dyn Fn(Fit) -> Vec<f64> + S
 
 /// The sets that are left where one cause of these is taken out and that none of `fitted` is, each fitted once.
 pub fn subsets<'f>(problem: &Problem<'_>, sets: impl Iterator<Item = &'f Fit>, fitted: &[&Fit]) -> Vec<Fit> {
+    missing(problem, sets, fitted, &|_, _| true)
+}
+
+/// The same, of `fitted` those counted that are `good` for the set as it is left.
+fn missing<'f>(
+    problem: &Problem<'_>,
+    sets: impl Iterator<Item = &'f Fit>,
+    fitted: &[&Fit],
+    good: &dyn Fn(&Fit, &Fit) -> bool,
+) -> Vec<Fit> {
     let mut missing: Vec<Fit> = Vec::new();
     for set in sets {
         for out in 0..set.terms.len() {
             let left = without(problem, set, out);
             let mut known = fitted.iter().copied().chain(&missing);
-            if !known.any(|fit| same_set(&fit.terms, &left.terms)) {
+            if !known.any(|fit| same_set(&fit.terms, &left.terms) && good(fit, &left)) {
                 missing.push(left);
             }
         }
@@ -173,24 +183,14 @@ fn repeated(problem: &Problem<'_>, fit: &Fit) -> f64 {
 
 /// With the subsets of the best sets that are missing or stand in a side valley, each fitted from where its set stood.
 fn closed(problem: &Problem<'_>, mut ranked: Vec<Ranked>) -> Vec<Ranked> {
+    // Fitted, and not as well as the larger set's own point without the cause: it stood in a side valley.
+    let good = |fit: &Fit, left: &Fit| fit.cost < problem.cost_at(&left.terms, &left.p) + NO_WORSE;
     for _ in 0..2 {
-        let mut missing: Vec<Fit> = Vec::new();
-        for set in ranked.iter().take(CLOSED).map(|r| &r.fit).filter(|fit| !fit.terms.is_empty()) {
-            for out in 0..set.terms.len() {
-                let subset = without(problem, set, out);
-                // Or fitted, and not as well as the larger set's own point without the cause: it stood in a side valley.
-                let cost = problem.cost_at(&subset.terms, &subset.p);
-                let mut known = ranked.iter().map(|r| &r.fit).chain(&missing);
-                if !known.any(|fit| same_set(&fit.terms, &subset.terms) && fit.cost < cost + NO_WORSE) {
-                    missing.push(subset);
-                }
-            }
-        }
-        if missing.is_empty() {
+        let known: Vec<&Fit> = ranked.iter().map(|r| &r.fit).collect();
+        let fits = missing(problem, known.iter().copied().take(CLOSED), &known, &good);
+        if fits.is_empty() {
             break;
         }
-        let fits: Vec<Fit> =
-            missing.into_par_iter().map(|s| problem.fit(&s.terms, s.p, SUBSET_ITERATIONS, None)).collect();
         ranked = rank(problem, ranked, fits);
     }
     ranked

@@ -38,8 +38,9 @@ impl Effect for ThermalFade {
     }
 }
 
-/// Slow node: its fade relative to the fast one's, its time over the fast one's. Both cool within the longest log, s: heat that
-/// does not is all the energy ever dissipated, which no log tells from the distance that was slid.
+/// Slow node: its fade relative to the fast one's, its time over the fast one's. The fast one cools within the longest
+/// log, s, the slow one, at least half as slow again, within one and a half of it: heat that does not is all the energy ever
+/// dissipated, which no log tells from the distance that was slid.
 fn values(p: &[f64], usual_w: f64, longest_s: f64) -> [f64; 6] {
     let within = |x: f64, low: f64, high: f64| x.exp().clamp(low, high);
     let (fade, time_s) = (within(p[0], 0.0, 1e3) / usual_w, within(p[1], 0.05, longest_s.max(0.1)));
