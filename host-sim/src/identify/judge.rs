@@ -18,7 +18,7 @@ use super::effects::coordinates::{Coordinates, Scales};
 use super::effects::{ContactView, DriveView, LIBRARY, NormalLoadView};
 use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
-use super::rest::{self, Rest};
+use super::rest::{self, Contribution, Ground, Rest};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
@@ -31,8 +31,6 @@ const LOG_PRIOR: f64 = -3.9;
 /// A set with so much less ln evidence than the best one is not the answer, e^−60 of it, however small the best one's causes
 /// are: their subsets stand in the table too.
 const OUT_OF_QUESTION: f64 = 60.0;
-/// A cause has to change the prediction by this share of what is left: a smaller one is part of what is not understood.
-const LEFT_SHARE: f64 = 0.5;
 /// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
 const SIZE_WIDTH: f64 = 0.25 / 1.7;
 /// Hypotheses below this probability say nothing of what is unknown.
@@ -71,12 +69,10 @@ pub struct Candidate {
     pub log_evidence: f64,
     /// Place in the balance's own list.
     pub place: usize,
-    /// Change of the prediction by each effect, relative to the signal, in the order of `effects`.
-    pub sizes: Vec<f64>,
+    /// What each effect does here, in the order of `effects`.
+    pub contributions: Vec<Contribution>,
     /// Share of its size that each effect's form here may be wrong by, in the order of `effects`.
     pub forms: Vec<f64>,
-    /// What a change has to exceed, relative to the signal: what the form of the model is known to, and what is left.
-    pub floor: f64,
 }
 
 /// A searched linear balance.
@@ -111,8 +107,8 @@ pub struct ContactPart {
     pub noise: Noise,
     /// Sets, best first.
     pub ranked: Vec<search::Ranked>,
-    /// Of each set, how much each of its terms changes the prediction, relative to the signal.
-    pub sizes: Vec<Vec<f64>>,
+    /// Of each set, what each of its terms does.
+    pub contributions: Vec<Vec<Contribution>>,
     /// The drive's cause that moves the contact otherwise than the encoder says.
     pub disc_cause: Option<DiscCause>,
 }
@@ -209,42 +205,35 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
 
 impl Linear {
     fn candidates(&self) -> Vec<Candidate> {
-        let names = |set: &[usize]| sorted(set.iter().map(|a| self.alternatives[*a].effect).collect());
         let mut out = Vec::new();
         for (place, solved) in self.solved.iter().enumerate() {
             let wanted = place < CANDIDATES || solved.set.len() < 2;
             if !wanted {
                 continue;
             }
-            let changes = self.changes(solved);
-            let mut effects: Vec<(&'static str, f64)> = solved
-                .set
-                .iter()
-                .zip(changes)
-                .map(|(a, change)| (self.alternatives[*a].effect, change / self.signal.max(1e-12)))
-                .collect();
+            let names = solved.set.iter().map(|a| self.alternatives[*a].effect);
+            let mut effects: Vec<(&'static str, Contribution)> =
+                names.zip(self.contributions(solved)).collect();
             effects.sort_by_key(|e| e.0);
-            debug_assert_eq!(names(&solved.set), effects.iter().map(|e| e.0).collect::<Vec<_>>());
             out.push(Candidate {
                 effects: effects.iter().map(|e| e.0).collect(),
                 log_evidence: solved.log_evidence,
                 place,
-                sizes: effects.iter().map(|e| e.1).collect(),
+                contributions: effects.iter().map(|e| e.1).collect(),
                 forms: vec![LAW_FORM; effects.len()],
-                floor: MODEL_FORM
-                    .max(LEFT_SHARE * self.rest(place).size * self.balance.scale / self.signal.max(1e-12)),
             });
         }
         out
     }
 
-    /// RMS change of the prediction when each alternative of a set is taken out and the others are fitted again.
-    fn changes(&self, solved: &Solved) -> Vec<f64> {
-        let change = |a: &usize| {
+    /// What each alternative of a set does, the others fitted again without it.
+    fn contributions(&self, solved: &Solved) -> Vec<Contribution> {
+        let own = |a: &usize| {
             let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
-            self.balance.difference(&solved.residual, &self.balance.solve(&self.alternatives, &set).residual)
+            let without = self.balance.solve(&self.alternatives, &set);
+            rest::contribution(&self.balance, self.signal, &solved.residual, &without.residual)
         };
-        solved.set.iter().map(change).collect()
+        solved.set.iter().map(own).collect()
     }
 
     /// What a set leaves.
@@ -285,7 +274,7 @@ pub struct TooSmall {
     pub effect: &'static str,
     /// What it changes, relative to the signal.
     pub size: f64,
-    /// What it would have to exceed: the form of the model, a share of what is left and of a larger cause beside it.
+    /// What it would have to change: by the form of the model, by the law of a larger cause beside it, by what it leaves.
     pub floor: f64,
 }
 
@@ -387,7 +376,7 @@ pub fn judge(
         }
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
-        let (noise, ranked, sizes, best) = {
+        let (noise, ranked, contributions, best) = {
             let mut problem = Problem::new(&logs, &baseline, &terms);
             let found = search::search(&mut problem, progress);
             let best = found.ranked.first().map_or(0.0, |r| r.log_evidence);
@@ -396,17 +385,20 @@ pub fn judge(
             let subsets =
                 search::subsets(&problem, found.ranked.iter().filter(in_question).map(|r| &r.fit), &fitted);
             fitted.extend(&subsets);
-            let sizes = |ranked: &search::Ranked| {
-                if in_question(&ranked) {
-                    search::sizes(&problem, &ranked.fit, &fitted)
+            let ground = Ground::new(&problem, &found.ranked[0].fit);
+            let contributions = |ranked: &search::Ranked| {
+                let fit = &ranked.fit;
+                let without = if in_question(&ranked) {
+                    search::without_each(&problem, fit, &fitted)
                 } else {
-                    search::largest_sizes(&problem, &ranked.fit)
-                }
+                    search::without_each_as_they_are(&problem, fit)
+                };
+                ground.contributions(&problem, fit, &without)
             };
-            let sizes: Vec<Vec<f64>> = found.ranked.par_iter().map(sizes).collect();
-            let best = of_largest_posterior(&found.ranked, &sizes);
+            let contributions: Vec<Vec<Contribution>> = found.ranked.par_iter().map(contributions).collect();
+            let best = of_largest_posterior(&found.ranked, &contributions);
             let best = problem.change(&best.terms, &best.p);
-            (problem.noise.clone(), found.ranked, sizes, best)
+            (problem.noise.clone(), found.ranked, contributions, best)
         };
         if let (Some(seen), true) = (without_normal_end(&logs, &best), normal_load.is_some()) {
             let seen: Option<Vec<NormalLoadLog>> = seen.iter().map(NormalLoadLog::new).collect();
@@ -415,8 +407,17 @@ pub fn judge(
         if let (Some(seen), true) = (without_ends(&logs, &best), drive.is_some()) {
             drive = of_drive(&seen);
         }
-        contact =
-            Some(ContactPart { logs, scales, baseline, block, terms, noise, ranked, sizes, disc_cause });
+        contact = Some(ContactPart {
+            logs,
+            scales,
+            baseline,
+            block,
+            terms,
+            noise,
+            ranked,
+            contributions,
+            disc_cause,
+        });
     } else {
         let inertia = drive_inertia(train)?;
         let logs = train.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
@@ -474,9 +475,10 @@ pub fn judge(
 
 /// The fit of the set that is the likeliest with its prior and in which no cause is too small to be told: a channel has an end
 /// where more says so than that nothing is lost by one.
-fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], sizes: &[Vec<f64>]) -> &'r Fit {
+fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], contributions: &[Vec<Contribution>]) -> &'r Fit {
     let posterior = |r: &search::Ranked| r.log_evidence + LOG_PRIOR * r.fit.terms.len() as f64;
-    let told = ranked.iter().zip(sizes).filter(|(_, sizes)| sizes.iter().all(|size| *size > MODEL_FORM));
+    let large = |own: &Contribution| own.size > MODEL_FORM;
+    let told = ranked.iter().zip(contributions).filter(|(_, all)| all.iter().all(large));
     let best = told.map(|(r, _)| r).max_by(|a, b| posterior(a).total_cmp(&posterior(b)));
     &best.unwrap_or(&ranked[0]).fit
 }
@@ -529,10 +531,8 @@ fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64)
 }
 
 fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
-    let ground = rest::Ground::new(contact);
-    let problem = contact.problem();
     let mut out = Vec::new();
-    for (place, (ranked, sizes)) in contact.ranked.iter().zip(&contact.sizes).enumerate() {
+    for (place, (ranked, contributions)) in contact.ranked.iter().zip(&contact.contributions).enumerate() {
         let fit = &ranked.fit;
         // A sum of columns finds its shape, a law has one.
         let of_term = |term: &usize| {
@@ -540,17 +540,16 @@ fn contact_candidates(contact: &ContactPart) -> Vec<Candidate> {
             let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
             (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
         };
-        let terms = fit.terms.iter().map(of_term).zip(sizes);
-        let mut effects: Vec<(&'static str, f64, f64)> =
-            terms.map(|((effect, form), size)| (effect, *size, form)).collect();
+        let terms = fit.terms.iter().map(of_term).zip(contributions);
+        let mut effects: Vec<(&'static str, f64, Contribution)> =
+            terms.map(|((effect, form), own)| (effect, form, *own)).collect();
         effects.sort_by_key(|e| e.0);
         out.push(Candidate {
             effects: effects.iter().map(|e| e.0).collect(),
             log_evidence: ranked.log_evidence,
             place,
-            sizes: effects.iter().map(|e| e.1).collect(),
-            forms: effects.iter().map(|e| e.2).collect(),
-            floor: MODEL_FORM.max(LEFT_SHARE * ground.size(&problem, fit)),
+            contributions: effects.iter().map(|e| e.2).collect(),
+            forms: effects.iter().map(|e| e.1).collect(),
         });
     }
     out
@@ -590,14 +589,20 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
                 let best = within(candidates, &effects)?;
                 log_weight += best.log_evidence;
                 places.push((*part, best.place));
-                for (own, (effect, size)) in best.effects.iter().zip(&best.sizes).enumerate() {
+                for (own, (effect, what)) in best.effects.iter().zip(&best.contributions).enumerate() {
                     let at = effects.iter().position(|e| e == effect)?;
-                    let others =
-                        best.sizes.iter().zip(&best.forms).enumerate().filter(|(other, _)| *other != own);
-                    let wrong_by = others.map(|(_, (size, form))| size * form).fold(0.0, f64::max);
-                    sizes[at] = sizes[at].max(*size);
-                    // What a second cause adds may be the first one's form.
-                    over_floor[at] = over_floor[at].max(*size / best.floor.max(wrong_by));
+                    let others = best
+                        .contributions
+                        .iter()
+                        .zip(&best.forms)
+                        .enumerate()
+                        .filter(|(other, _)| *other != own);
+                    let wrong_by = others.map(|(_, (other, form))| other.size * form).fold(0.0, f64::max);
+                    sizes[at] = sizes[at].max(what.size);
+                    // What a second cause adds may be the first one's form, and what explains less than it leaves may be part
+                    // of what is not understood.
+                    let over = (what.size / MODEL_FORM.max(wrong_by)).min(what.over_rest);
+                    over_floor[at] = over_floor[at].max(over);
                 }
             }
             Some(Hypothesis { effects, log_weight, places, sizes, over_floor, probability: 0.0 })
@@ -728,6 +733,28 @@ impl Judgement {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cause_explains_more_than_it_leaves() {
+        // Two sets in one balance; the second cause is large enough and its evidence is sure.
+        let told = |over_rest: f64| {
+            let candidate = |effects: &[&'static str], log_evidence: f64, place: usize| Candidate {
+                effects: effects.to_vec(),
+                log_evidence,
+                place,
+                contributions: effects
+                    .iter()
+                    .map(|e| Contribution { size: 0.05, over_rest: if *e == "b" { over_rest } else { 9.0 } })
+                    .collect(),
+                forms: vec![LAW_FORM; effects.len()],
+            };
+            let candidates = vec![candidate(&["a", "b"], 50.0, 0), candidate(&["a"], 0.0, 1)];
+            table(&[(Part::Friction, candidates)]).0[0].clone()
+        };
+        assert_eq!(told(3.0).effects, ["a", "b"]);
+        assert!(told(3.0).probability > 0.99 && (told(1.0).probability - 0.5).abs() < 0.01);
+        assert_eq!(told(0.8).effects, ["a"]);
+    }
 
     #[test]
     fn what_may_be_a_form_is_the_set_without_it() {

@@ -48,6 +48,28 @@ impl Rest {
     }
 }
 
+/// What a cause of a set does in a balance.
+#[derive(Debug, Clone, Copy)]
+pub struct Contribution {
+    /// Change of the prediction when it is taken out and the others are fitted again, relative to the signal.
+    pub size: f64,
+    /// Amplitude of the structured rest that it explains over that which the whole set leaves.
+    pub over_rest: f64,
+}
+
+impl Contribution {
+    /// From the size, and the structured rests with and without it.
+    fn new(size: f64, with: f64, without: f64) -> Self {
+        // Where nothing is structured without it either, its size alone is what is known of it.
+        let over_rest = if without > 0.0 {
+            (without * without - with * with).max(0.0).sqrt() / with
+        } else {
+            f64::INFINITY
+        };
+        Self { size, over_rest }
+    }
+}
+
 /// Mean squares of means over blocks, less what noise leaves of them.
 fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> (f64, f64) {
     let (mut sum, mut left, mut count) = (0.0, 0.0, 0.0f64);
@@ -87,20 +109,18 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Of a searched contact.
-    pub fn new(contact: &ContactPart) -> Self {
-        let problem = contact.problem();
+    /// Of a contact in which `best` is the best fit.
+    pub fn new(problem: &Problem<'_>, best: &Fit) -> Self {
         let limit = problem.well_known_nm();
         let deviation = problem.noise.deviation.clone();
-        let used = &contact.ranked[0].fit.r;
-        let dense = contact.logs.iter().all(|log| log.grid.is_dense());
-        let step_s = contact.logs.first().map_or(1e-3, |log| log.grid.step_s);
+        let dense = problem.logs.iter().all(|log| log.grid.is_dense());
+        let step_s = problem.logs.first().map_or(1e-3, |log| log.grid.step_s);
         Self {
             rows: (0..deviation.len())
-                .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && used[*i] != 0.0)
+                .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && best.r[*i] != 0.0)
                 .collect(),
             // Points between samples share the samples' noise.
-            white: contact
+            white: problem
                 .logs
                 .iter()
                 .flat_map(|log| vec![log.friction_noise_nm / log.grid.density.sqrt(); log.len()])
@@ -133,6 +153,15 @@ impl Ground {
         self.structured(&self.left(problem, fit)).0.sqrt() / self.signal
     }
 
+    /// What each cause of a fit does, from the fits without it.
+    pub fn contributions(&self, problem: &Problem<'_>, fit: &Fit, without: &[Fit]) -> Vec<Contribution> {
+        let with = self.size(problem, fit);
+        let own = |left: &Fit| {
+            Contribution::new(search::difference(problem, &fit.r, &left.r), with, self.size(problem, left))
+        };
+        without.iter().map(own).collect()
+    }
+
     /// What a fit leaves, N m; before the sensor's mode, where it rings: what strikes it between two samples is not known
     /// better than to a part of a period, and what then rings is no more than the same error once again.
     fn left(&self, problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
@@ -151,7 +180,7 @@ impl Ground {
 
 /// Whether no sample of the channel is well known.
 pub fn nothing_is_known(contact: &ContactPart) -> bool {
-    Ground::new(contact).rows.is_empty()
+    Ground::new(&contact.problem(), &contact.ranked[0].fit).rows.is_empty()
 }
 
 /// Of the contact's balance; `disc_cause` where the hypothesis has it.
@@ -163,11 +192,11 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         let over = cause.residual_nm.iter().zip(&problem.noise.deviation).zip(&fit.r);
         over.map(|((r, s), used)| if *used == 0.0 { 0.0 } else { r / s }).collect::<Vec<f64>>()
     });
-    let mut explained = contact.sizes[place].clone();
+    let mut explained: Vec<f64> = contact.contributions[place].iter().map(|own| own.size).collect();
     if let (Some(as_logged), Some(none)) = (&as_logged, none) {
         explained.push(search::difference(&problem, none, as_logged));
     }
-    let ground = Ground::new(contact);
+    let ground = Ground::new(&problem, &contact.ranked[0].fit);
     let residual = ground.left(&problem, fit);
     if ground.rows.is_empty() {
         // What cannot be looked at is not explained.
@@ -245,6 +274,18 @@ fn follows(
     out
 }
 
+/// What an alternative does in a linear balance: its size, relative to the signal, from the residuals with and without it. What
+/// is left lasts, or it rattles from row to row, as play does: whichever is most.
+pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &[f64]) -> Contribution {
+    let [block, _] = blocks(balance.row_step_s);
+    let named: Vec<f64> = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
+    let [with, left] = [residual, without].map(|residual| {
+        let long = structured(residual, &balance.first_deviation, &balance.used, block).0;
+        long.max(structured(residual, &named, &balance.used, 1).0).sqrt()
+    });
+    Contribution::new(balance.difference(residual, without) / signal.max(1e-12), with, left)
+}
+
 /// Of a linear balance. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.
 pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> Rest {
     let [block, _] = blocks(balance.row_step_s);
@@ -264,6 +305,16 @@ pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_cause_explains_is_weighed_against_what_it_leaves() {
+        let over = |with, without| Contribution::new(0.02, with, without).over_rest;
+        assert!((over(3.0, 5.0) - 4.0 / 3.0).abs() < 1e-12);
+        // It leaves more than was left without it.
+        assert_eq!(over(5.0, 3.0), 0.0);
+        // Nothing is left; nothing was left without it.
+        assert_eq!([over(0.0, 5.0), over(0.0, 0.0)], [f64::INFINITY; 2]);
+    }
 
     #[test]
     fn what_noise_may_have_left_is_nothing_unknown() {

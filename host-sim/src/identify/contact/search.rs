@@ -49,25 +49,25 @@ const BENDING: usize = 5;
 /// Sets whose subsets stay in the comparison, so that what a cause adds is seen beside the same others.
 const CLOSED: usize = 3;
 
-/// How much the prediction changes, relative to the signal, when each of a set's terms is taken out and the others are
-/// fitted again, where that set is not among those that are.
-pub fn sizes(problem: &Problem<'_>, fit: &Fit, fitted: &[&Fit]) -> Vec<f64> {
-    changes(problem, fit, &|left| match fitted.iter().find(|known| same_set(&known.terms, &left.terms)) {
-        Some(known) => known.r.clone(),
-        None => problem.fit(&left.terms, left.p, SUBSET_ITERATIONS, None).r,
-    })
+/// A set without each of its terms, the others fitted again where that set is not among those that are.
+pub fn without_each(problem: &Problem<'_>, fit: &Fit, fitted: &[&Fit]) -> Vec<Fit> {
+    let left = |out| {
+        let left = without(problem, fit, out);
+        match fitted.iter().find(|known| same_set(&known.terms, &left.terms)) {
+            Some(known) => (*known).clone(),
+            None => problem.fit(&left.terms, left.p, SUBSET_ITERATIONS, None),
+        }
+    };
+    (0..fit.terms.len()).into_par_iter().map(left).collect()
 }
 
-/// As [`sizes`], the others as they are: more than the whole truth.
-pub fn largest_sizes(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
-    changes(problem, fit, &|left| problem.residuals(&left.terms, &left.p))
-}
-
-fn changes(problem: &Problem<'_>, fit: &Fit, left: &(dyn Fn(Fit) -> Vec<f64> + Sync)) -> Vec<f64> {
-    (0..fit.terms.len())
-        .into_par_iter()
-        .map(|out| difference(problem, &fit.r, &left(without(problem, fit, out))))
-        .collect()
+/// As [`without_each`], the others as they are: what that leaves is more than the whole truth.
+pub fn without_each_as_they_are(problem: &Problem<'_>, fit: &Fit) -> Vec<Fit> {
+    let left = |out| {
+        let left = without(problem, fit, out);
+        Fit { r: problem.residuals(&left.terms, &left.p), ..left }
+    };
+    (0..fit.terms.len()).into_par_iter().map(left).collect()
 }
 
 /// The sets that are left where one cause of these is taken out and that none of `fitted` is, each fitted once.
@@ -128,7 +128,8 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
     for what in ["pairs of causes", "three causes at once"] {
         // A set whose parts are too small to matter has no larger one worth a search.
         let worth = parents.first().is_some_and(|best| {
-            sizes(problem, best, &all.iter().collect::<Vec<_>>()).iter().all(|s| *s > WORTH)
+            let left = without_each(problem, best, &all.iter().collect::<Vec<_>>());
+            left.iter().all(|left| difference(problem, &best.r, &left.r) > WORTH)
         });
         if !worth {
             break;
