@@ -1,6 +1,7 @@
 //! What is left after the best hypothesis: how large, how far beyond noise, what it follows.
 
 use super::balance::Balance;
+use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Fit, Problem, before_ringing};
 use super::contact::search;
@@ -70,8 +71,31 @@ impl Contribution {
     }
 }
 
+/// Noise of samples.
+#[derive(Debug, Clone, Default)]
+struct Noise {
+    /// Deviation of what is new in each sample.
+    white: Vec<f64>,
+    /// Variance of what repeats itself in the next samples; empty where nothing does.
+    repeated: Vec<f64>,
+}
+
+impl Noise {
+    fn white(deviation: Vec<f64>) -> Self {
+        Self { white: deviation, repeated: Vec::new() }
+    }
+
+    /// Variance of the mean of a block.
+    fn of_mean(&self, block: &[usize]) -> f64 {
+        let n = block.len() as f64;
+        let white = block.iter().map(|i| self.white[*i].powi(2)).sum::<f64>() / n;
+        let repeated = block.iter().filter_map(|i| self.repeated.get(*i)).sum::<f64>();
+        (white + repeated) / n
+    }
+}
+
 /// Mean squares of means over blocks, less what noise leaves of them.
-fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> (f64, f64) {
+fn structured(residual: &[f64], noise: &Noise, rows: &[usize], block: usize) -> (f64, f64) {
     let (mut sum, mut left, mut count) = (0.0, 0.0, 0.0f64);
     for chunk in rows.chunks(block) {
         if chunk.len() * 2 < block {
@@ -80,7 +104,7 @@ fn structured(residual: &[f64], noise: &[f64], rows: &[usize], block: usize) -> 
         let n = chunk.len() as f64;
         let mean = chunk.iter().map(|i| residual[*i]).sum::<f64>() / n;
         sum += mean * mean;
-        left += chunk.iter().map(|i| noise[*i].powi(2)).sum::<f64>() / (n * n);
+        left += noise.of_mean(chunk);
         count += 1.0;
     }
     let count = count.max(1.0);
@@ -96,10 +120,11 @@ fn blocks(step_s: f64) -> [usize; 2] {
 pub struct Ground {
     /// Deviations of the noise model, N m.
     deviation: Vec<f64>,
-    /// White noise of the sensor alone, N m: what is left of it in a block is known.
-    white: Vec<f64>,
-    /// The most that makes a single sample uncertain, N m; empty where points of the grid are no samples.
-    named: Vec<f64>,
+    /// White noise of the sensor, N m, and what else is named: what makes a sample uncertain near a transition does so for all of
+    /// a block.
+    noise: Noise,
+    /// The most that makes a single sample uncertain, N m; `None` where points of the grid are no samples.
+    of_sample: Option<Noise>,
     /// Samples that are well known.
     rows: Vec<usize>,
     /// Samples in the blocks.
@@ -115,21 +140,17 @@ impl Ground {
         let deviation = problem.noise.deviation.clone();
         let dense = problem.logs.iter().all(|log| log.grid.is_dense());
         let step_s = problem.logs.first().map_or(1e-3, |log| log.grid.step_s);
+        let named = || (0..deviation.len()).map(|i| problem.noise.named(i));
+        // Points between samples share the samples' noise.
+        let of_log = |log: &ContactLog| vec![log.friction_noise_nm / log.grid.density.sqrt(); log.len()];
+        let white: Vec<f64> = problem.logs.iter().flat_map(of_log).collect();
+        let repeated = named().zip(&white).map(|(named, white)| (named * named - white * white).max(0.0));
         Self {
             rows: (0..deviation.len())
                 .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && best.r[*i] != 0.0)
                 .collect(),
-            // Points between samples share the samples' noise.
-            white: problem
-                .logs
-                .iter()
-                .flat_map(|log| vec![log.friction_noise_nm / log.grid.density.sqrt(); log.len()])
-                .collect(),
-            named: if dense {
-                (0..deviation.len()).map(|i| NAMED_WITHIN * problem.noise.named(i)).collect()
-            } else {
-                Vec::new()
-            },
+            of_sample: dense.then(|| Noise::white(named().map(|named| NAMED_WITHIN * named).collect())),
+            noise: Noise { repeated: if dense { repeated.collect() } else { Vec::new() }, white },
             signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
             blocks: blocks(step_s),
             deviation,
@@ -143,8 +164,8 @@ impl Ground {
     /// What is structured over long blocks, short ones or from sample to sample, whichever is most, with what noise leaves
     /// there.
     fn structured(&self, residual: &[f64]) -> (f64, f64) {
-        let [long, short] = self.blocks.map(|block| structured(residual, &self.white, &self.rows, block));
-        let each = (!self.named.is_empty()).then(|| structured(residual, &self.named, &self.rows, 1));
+        let [long, short] = self.blocks.map(|block| structured(residual, &self.noise, &self.rows, block));
+        let each = self.of_sample.as_ref().map(|noise| structured(residual, noise, &self.rows, 1));
         [short].into_iter().chain(each).fold(long, |most, other| if other.0 > most.0 { other } else { most })
     }
 
@@ -214,7 +235,7 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
 }
 
 fn contact_quantities(contact: &ContactPart) -> Vec<(String, Vec<f64>)> {
-    let gather = |of: &dyn Fn(&super::contact::log::ContactLog, usize) -> f64| -> Vec<f64> {
+    let gather = |of: &dyn Fn(&ContactLog, usize) -> f64| -> Vec<f64> {
         contact
             .logs
             .iter()
@@ -278,10 +299,11 @@ fn follows(
 /// is left lasts, or it rattles from row to row, as play does: whichever is most.
 pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
-    let named: Vec<f64> = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
+    let most = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
+    let (noise, of_row) = (Noise::white(balance.first_deviation.clone()), Noise::white(most));
     let [with, left] = [residual, without].map(|residual| {
-        let long = structured(residual, &balance.first_deviation, &balance.used, block).0;
-        long.max(structured(residual, &named, &balance.used, 1).0).sqrt()
+        let long = structured(residual, &noise, &balance.used, block).0;
+        long.max(structured(residual, &of_row, &balance.used, 1).0).sqrt()
     });
     Contribution::new(balance.difference(residual, without) / signal.max(1e-12), with, left)
 }
@@ -290,8 +312,9 @@ pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &
 pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> Rest {
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
-    let (rest, left) = structured(residual, &balance.first_deviation, &balance.used, block);
-    let before = none.map_or(rest, |none| structured(none, &balance.first_deviation, &balance.used, block).0);
+    let noise = Noise::white(balance.first_deviation.clone());
+    let (rest, left) = structured(residual, &noise, &balance.used, block);
+    let before = none.map_or(rest, |none| structured(none, &noise, &balance.used, block).0);
     let time: Vec<f64> = (0..residual.len()).map(|i| i as f64).collect();
     Rest {
         size: rest.sqrt() / balance.scale.max(1e-12),
@@ -305,6 +328,17 @@ pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_repeats_itself_stays_in_a_mean_and_what_is_new_does_not() {
+        let rows: Vec<usize> = (0..100).collect();
+        let mut noise = Noise { white: vec![0.3; 100], repeated: vec![0.04; 100] };
+        let residual = vec![0.5; 100];
+        let (rest, left) = structured(&residual, &noise, &rows, 50);
+        assert!((left - (0.09 / 50.0 + 0.04)).abs() < 1e-12 && (rest - (0.25 - left)).abs() < 1e-12);
+        noise.repeated.clear();
+        assert!((structured(&residual, &noise, &rows, 50).1 - 0.09 / 50.0).abs() < 1e-12);
+    }
 
     #[test]
     fn what_a_cause_explains_is_weighed_against_what_it_leaves() {
