@@ -12,3 +12,4 @@ pub mod extension;
 pub mod friction;
 pub mod real;
 pub mod selfcheck;
+pub mod sensor;

@@ -231,7 +231,7 @@ pub fn median_magnitude(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::predict::SecondOrder;
+    use model_core::sensor::{SecondOrder, SecondOrderState};
 
     #[test]
     fn steps_see_what_swings_from_sample_to_sample_and_not_a_slope() {
@@ -276,11 +276,12 @@ mod tests {
         // Struck every 500 samples; the mode moves in steps of a tenth of a sample.
         let struck = |t: f64| (0.02 * t).sin() + if (t / 500.0).floor() % 2.0 > 0.0 { 1.0 } else { 0.0 };
         for (omega, width) in [(0.14, 3.5), (0.4, 1.6), (1.53, 1.2)] {
-            let mut mode = SecondOrder::new(omega / std::f64::consts::TAU, 0.005, struck(0.0));
+            let mode = SecondOrder::new(omega / std::f64::consts::TAU, 0.005, 0.1);
+            let mut state = SecondOrderState::holding(struck(0.0));
             let shown: Vec<f64> = (0..3000)
                 .map(|i| {
-                    let fine =
-                        (1..=10).map(|j| mode.step(0.1, struck(f64::from(i) + 0.1 * f64::from(j) - 1.0)));
+                    let fine = (1..=10)
+                        .map(|j| mode.step(&mut state, struck(f64::from(i) + 0.1 * f64::from(j) - 1.0)));
                     fine.last().unwrap_or_default()
                 })
                 .collect();

@@ -1,9 +1,10 @@
 //! What is left after the best hypothesis: how large, how far beyond noise, what it follows.
 
 use super::balance::Balance;
+use super::contact::channel::before_ringing;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
-use super::contact::problem::{Fit, Problem, before_ringing};
+use super::contact::problem::{Fit, Problem};
 use super::contact::search;
 use super::filters::rms;
 use super::judge::{ContactPart, DiscCause};

@@ -7,6 +7,7 @@
 use super::noise::Noise;
 use super::parameters::{AnalogueParameters, NoiseParameters};
 use model_core::control::AdcScan;
+use model_core::sensor::SensorChain;
 
 /// Voltages of the five analogue inputs, in the order of the converter's scan.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -75,14 +76,15 @@ impl Analogue {
 
     #[inline]
     pub(crate) fn pins(&self, q: &Quantities, noise: &mut Noise) -> PinVoltages {
-        let clip = |v: f64| v.clamp(self.clip_low_v, self.clip_high_v);
+        let ends_v = (self.clip_low_v, self.clip_high_v);
         let n = noise.draw(&self.noise);
+        let pin = |zero_v, gain, noise_v| Pin { zero_v, gain, noise_v, ends_v };
         PinVoltages {
-            friction_bridge_v: clip(self.middle_v + self.friction_v_per_nm * q.friction_nm + n[0]),
-            normal_bridge_v: clip(self.normal_zero_v + self.normal_v_per_n * q.normal_n + n[1]),
-            m1_torque_v: clip(self.middle_v + self.monitor_v_per_nm * q.m1_torque_nm + n[2]),
-            m2_torque_v: clip(self.middle_v + self.monitor_v_per_nm * q.m2_torque_nm + n[3]),
-            supply_v: clip(self.supply_pin_v + n[4]),
+            friction_bridge_v: pin(self.middle_v, self.friction_v_per_nm, n[0]).show(q.friction_nm),
+            normal_bridge_v: pin(self.normal_zero_v, self.normal_v_per_n, n[1]).show(q.normal_n),
+            m1_torque_v: pin(self.middle_v, self.monitor_v_per_nm, n[2]).show(q.m1_torque_nm),
+            m2_torque_v: pin(self.middle_v, self.monitor_v_per_nm, n[3]).show(q.m2_torque_nm),
+            supply_v: pin(self.supply_pin_v, 0.0, n[4]).show(0.0),
         }
     }
 
@@ -98,6 +100,29 @@ impl Analogue {
             m2_torque: code(pins.m2_torque_v),
             supply: code(pins.supply_v),
         }
+    }
+}
+
+/// The part of a sensor that acts on a sample, V: behind a [`super::bridge`] its amplifier, in front of the converter.
+struct Pin {
+    zero_v: f64,
+    /// V per unit of the quantity.
+    gain: f64,
+    noise_v: f64,
+    ends_v: (f64, f64),
+}
+
+impl SensorChain for Pin {
+    type Signal = f64;
+
+    #[inline]
+    fn amplifier(&mut self, quantity: f64) -> f64 {
+        self.zero_v + self.gain * quantity + self.noise_v
+    }
+
+    #[inline]
+    fn clip(&mut self, volts: f64) -> f64 {
+        volts.clamp(self.ends_v.0, self.ends_v.1)
     }
 }
 

@@ -216,8 +216,8 @@ impl Plant {
         let s = &self.state;
         let pins = self.analogue.pins(
             &Quantities {
-                friction_nm: self.calm.bridges[0].output(&s.bridges[0]),
-                normal_n: self.calm.bridges[1].output(&s.bridges[1]),
+                friction_nm: s.bridges[0].shown(),
+                normal_n: s.bridges[1].shown(),
                 m1_torque_nm: s.normal_load.torque_nm(),
                 m2_torque_nm: s.m2_torque_nm,
             },

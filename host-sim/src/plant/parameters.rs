@@ -4,6 +4,7 @@
 use super::elements::ElementParameters;
 use model_core::error::ParameterError;
 use model_core::extension::Extensions;
+use model_core::sensor::{DAMPING_RATIO, MODE_HZ};
 
 /// Everything the plant is built from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -348,8 +349,8 @@ impl PlantParameters {
             ),
         ] {
             if let Some(mode) = &bridge.mode {
-                within(names[0], mode.mode_hz, 1.0, 1e5, "1 to 1e5 Hz")?;
-                within(names[1], mode.damping_ratio, 0.0, 10.0, "0 to 10")?;
+                MODE_HZ.check(names[0], mode.mode_hz)?;
+                DAMPING_RATIO.check(names[1], mode.damping_ratio)?;
             }
             if let Some(lowpass_hz) = bridge.lowpass_hz {
                 within(names[2], lowpass_hz, 1.0, 1e5, "1 to 1e5 Hz")?;

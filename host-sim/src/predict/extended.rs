@@ -1,27 +1,21 @@
 //! Friction torque from an extended model, as the control core's observer runs it.
 //!
-//! Order of the friction channel: ring, amplifier, drift and crosstalk, delay, clipping. A ring among the
-//! effects stands in for the rig file's. Delay and clipping act on the samples, as steps of changing
-//! length have no common memory. The element is taken as cold and unworn at the first sample. Effects of
+//! The friction channel is a [`SensorChain`] in two parts: mode, amplifier and low-pass act on the steps, delay and clipping
+//! on the samples, as steps of changing length have no common memory. A ring among the effects stands in for the rig
+//! file's. The element is taken as cold and unworn at the first sample. Effects of
 //! pressure and drive do not act here.
-
-use std::f64::consts::FRAC_1_SQRT_2;
 
 use model_core::extension::adc_saturation::AdcSaturation;
 use model_core::extension::{ExtendedFriction, ExtendedInput, Extension, Extensions};
+use model_core::sensor::SensorChain;
 
+use super::bridge::BridgeModel;
 use super::curve::shifted;
 use super::friction::StepPlan;
 use super::inputs::ContactInputs;
-use super::second_order::SecondOrder;
 use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
-
-/// The core's ring takes damping ratios from here …
-const LEAST_DAMPING: f64 = 1e-4;
-/// … to here.
-const MOST_DAMPING: f64 = 0.99;
 
 /// Whether the model has an effect that changes the friction channel.
 pub fn acts_on_friction(model: &ModelFile) -> bool {
@@ -44,16 +38,17 @@ pub(super) fn simulate(
     let radius_m = rig.friction_radius_m;
     let mut effects = Extensions::none(SOME_STEP_S);
     if let Some(mode) = rig.friction_bridge.mode {
-        let damping_ratio = mode.damping_ratio.clamp(LEAST_DAMPING, MOST_DAMPING);
-        effects.set(Extension::RingResonance, &[mode.mode_hz, damping_ratio])?;
+        effects.set(Extension::RingResonance, &[mode.mode_hz, mode.damping_ratio])?;
     }
-    let (mut delay_s, mut clipping) = (0.0, None);
+    let mut samples = Samples { time_s: &inputs.time_s, delay_s: 0.0, clipping: None };
     for extension in &model.extensions {
         let Some(effect) = Extension::with_id(&extension.id) else { continue };
         let values: Vec<f64> = extension.parameters.iter().map(|(_, value)| *value).collect();
         match (effect, values.as_slice()) {
-            (Extension::FrictionDelay, [delay]) => delay_s += delay,
-            (Extension::AdcSaturation, [low, high]) => clipping = Some(AdcSaturation::new(&[*low, *high])?),
+            (Extension::FrictionDelay, [delay_s]) => samples.delay_s += delay_s,
+            (Extension::AdcSaturation, [low, high]) => {
+                samples.clipping = Some(AdcSaturation::new(&[*low, *high])?);
+            }
             _ => effects.set(effect, &values)?,
         }
     }
@@ -67,8 +62,7 @@ pub(super) fn simulate(
     let initial_nm = inputs.initial_friction_n * radius_m;
     let start = input(first.speed_m_s, first.load_n, first.angle_rad);
     let mut state = extended.holding(initial_nm, &start);
-    let lowpass_hz = rig.friction_bridge.lowpass_hz;
-    let mut lowpass = lowpass_hz.map(|hz| SecondOrder::new(hz, FRAC_1_SQRT_2, initial_nm));
+    let mut amplifier = BridgeModel::low_pass_alone(&rig.friction_bridge, initial_nm);
 
     let mut shown = Vec::with_capacity(inputs.len());
     shown.push(initial_nm);
@@ -80,18 +74,35 @@ pub(super) fn simulate(
                 extended.set_step_s(step.length_s);
                 last_step_s = step.length_s;
             }
-            let output = extended.step(&mut state, &input(step.speed_m_s, step.load_n, step.angle_rad));
-            last_nm = lowpass
-                .as_mut()
-                .map_or(output.shown_nm, |lowpass| lowpass.step(step.length_s, output.shown_nm));
+            let low_pass = |torque_nm: f64| amplifier.step(step.length_s, torque_nm);
+            let input = input(step.speed_m_s, step.load_n, step.angle_rad);
+            last_nm = extended.step_filtered(&mut state, &input, low_pass).shown_nm;
         }
         shown.push(last_nm);
     }
-    let mut shown = shifted(&inputs.time_s, &shown, -delay_s);
-    if let Some(clipping) = clipping {
-        shown.iter_mut().for_each(|torque_nm| *torque_nm = clipping.shown_nm(*torque_nm));
+    Ok(samples.show(shown))
+}
+
+/// The part of the channel that acts on samples.
+struct Samples<'a> {
+    time_s: &'a [f64],
+    delay_s: f64,
+    clipping: Option<AdcSaturation<f64>>,
+}
+
+impl SensorChain for Samples<'_> {
+    type Signal = Vec<f64>;
+
+    fn delay(&mut self, torque_nm: Vec<f64>) -> Vec<f64> {
+        shifted(self.time_s, &torque_nm, -self.delay_s)
     }
-    Ok(shown)
+
+    fn clip(&mut self, mut torque_nm: Vec<f64>) -> Vec<f64> {
+        if let Some(clipping) = &self.clipping {
+            torque_nm.iter_mut().for_each(|torque_nm| *torque_nm = clipping.shown_nm(*torque_nm));
+        }
+        torque_nm
+    }
 }
 
 #[cfg(test)]
@@ -125,7 +136,7 @@ mod tests {
         let plain = torque("");
         let none = torque("[[extension]]\nid = \"viscous_film\"\ncoefficient_n_s_per_m = 0\n");
         for (a, b) in plain.iter().zip(&none) {
-            // The core's ring and the tool's are written differently: rounding of 2000 samples.
+            // The effects' way and the plain one multiply with the radius at different places: rounding of 2000 samples.
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
     }

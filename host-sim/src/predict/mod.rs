@@ -17,7 +17,6 @@ mod friction;
 mod inputs;
 mod normal_force;
 pub mod observed_slip;
-mod second_order;
 
 pub use bridge::BridgeModel;
 pub use drive::predict_drive;
@@ -28,7 +27,6 @@ pub use friction::{
 pub use inputs::ContactInputs;
 pub(crate) use inputs::integral;
 pub use normal_force::predict_normal_force;
-pub use second_order::SecondOrder;
 
 /// A signal as measured and as predicted, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -8,8 +8,8 @@
 //! A patch is one of [`PATCH_BRISTLES`] bristles for the whole contact. Rubber is taken to run through it at the sliding
 //! speed, as on a wheel; a block that is held fast has no transport, and costs the same.
 //!
-//! predicted = r·Σ F_i with its effects, passed through a second order Butterworth low-pass like the bridge's amplifier, so that
-//! measurement and prediction are late by the same time. residual = measured − predicted, with a running mean
+//! predicted = r·Σ F_i with its effects, as a friction channel with a second order Butterworth low-pass like the bridge's
+//! amplifier shows it ([`crate::sensor::SensorChain`]), so that measurement and prediction are late by the same time. residual = measured − predicted, with a running mean
 //! square (one pole; its root is taken by whoever shows it).
 //!
 //! Left out: the torque ring's own mode (600 Hz), which is fast against anything the model predicts.
@@ -203,11 +203,14 @@ impl Observer {
         friction_torque_nm: f32,
     ) -> Observed {
         let (rubber, rubber_state) = (&self.model.rubber, &mut state.rubber);
-        let shown = self
-            .model
-            .around
-            .step_around(&mut state.around, measured, |whole| rubber.step(rubber_state, whole));
-        let predicted_nm = self.lowpass.step(&mut state.lowpass, shown.shown_nm);
+        let (lowpass, lowpass_state) = (&self.lowpass, &mut state.lowpass);
+        let shown = self.model.around.step_around(
+            &mut state.around,
+            measured,
+            |whole| rubber.step(rubber_state, whole),
+            |torque_nm| lowpass.step(lowpass_state, torque_nm),
+        );
+        let predicted_nm = shown.shown_nm;
         let residual_nm = friction_torque_nm - predicted_nm;
         state.mean_square += self.averaging * (residual_nm * residual_nm - state.mean_square);
         if !state.mean_square.is_finite() {

@@ -7,6 +7,7 @@
 
 use crate::error::{ParameterError, require};
 use crate::real::Real;
+use crate::sensor::LEAST_GAIN;
 
 /// Drift, prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,18 +61,18 @@ impl<T: Real> BridgeDrift<T> {
         torque_nm * (T::ONE + self.gain_rate * h) + self.zero_rate * h
     }
 
-    /// The torque behind a shown one, N·m. The gain is kept above 1/10.
+    /// The torque behind a shown one, N·m. The gain is kept above [`LEAST_GAIN`].
     #[inline]
     pub fn true_torque_nm(&self, shown_nm: T, time_s: T) -> T {
         let h = self.shape(time_s);
-        (shown_nm - self.zero_rate * h) / (T::ONE + self.gain_rate * h).at_least(T::from_f64(0.1))
+        (shown_nm - self.zero_rate * h) / (T::ONE + self.gain_rate * h).at_least(T::from_f64(LEAST_GAIN))
     }
 
-    /// The normal force behind a measured one, N. The gain is kept above 1/10.
+    /// The normal force behind a measured one, N. The gain is kept above [`LEAST_GAIN`].
     #[inline]
     pub fn true_normal_force_n(&self, measured_n: T, time_s: T) -> T {
         let h = self.shape(time_s);
-        let gain = (T::ONE + self.normal_gain_rate * h).at_least(T::from_f64(0.1));
+        let gain = (T::ONE + self.normal_gain_rate * h).at_least(T::from_f64(LEAST_GAIN));
         (measured_n - self.normal_zero_rate * h) / gain
     }
 }

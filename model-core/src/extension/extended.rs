@@ -2,12 +2,11 @@
 //! friction channel shows.
 //!
 //! v = r ω (corrected for the encoder), F_N (corrected for drift) → road factor, creep → friction model
-//! → torque r (F + F_film) → ring → drift, crosstalk → delay → clipping.
+//! → torque r (F + F_film) → the friction channel, a [`SensorChain`].
 //!
 //! Effects that depend on the force or the tip's speed take those of the step before.
 
-use super::friction_delay::Past;
-use super::ring_resonance::{RingResonance, RingState};
+use super::channel::{AtRest, ChannelState, Moving};
 use super::rubber_relaxation::{BRANCHES, Creep};
 use super::set::Extensions;
 use super::static_ageing::StaticAgeing;
@@ -16,6 +15,7 @@ use super::wear_drift::Distance;
 use crate::error::{ParameterError, require};
 use crate::friction::{Contact, FrictionForce, FrictionModel, FrictionState};
 use crate::real::Real;
+use crate::sensor::{SensorChain, SensorUndo};
 
 /// What is measured over one step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -57,8 +57,7 @@ pub struct ExtendedState<T> {
     distance: Distance<T>,
     age_s: T,
     creep_m: Creep<T>,
-    ring: RingState<T>,
-    past: Past<T>,
+    channel: ChannelState<T>,
 }
 
 impl<T: Real> ExtendedState<T> {
@@ -96,8 +95,7 @@ impl<T: Real> ExtendedFriction<T> {
     /// carry it; cold and unworn.
     pub fn holding(&self, shown_nm: T, input: &ExtendedInput<T>) -> ExtendedState<T> {
         let contact = self.contact(input, T::ZERO, T::ONE);
-        let crosstalk = self.effects.bridge_crosstalk.as_ref();
-        let torque_nm = shown_nm - crosstalk.map_or(T::ZERO, |c| c.torque_nm(input.normal_force_n));
+        let torque_nm = self.at_rest(T::ZERO, input.normal_force_n).undo(shown_nm);
         ExtendedState {
             friction: self.friction.holding(torque_nm / self.radius_m, &contact),
             force_n: torque_nm / self.radius_m,
@@ -108,8 +106,7 @@ impl<T: Real> ExtendedFriction<T> {
             distance: Distance::default(),
             age_s: self.effects.static_ageing.as_ref().map_or(T::ZERO, StaticAgeing::first_age_s),
             creep_m: [T::ZERO; BRANCHES],
-            ring: RingResonance::holding(torque_nm),
-            past: Past::holding(shown_nm),
+            channel: ChannelState::holding(torque_nm, shown_nm),
         }
     }
 
@@ -117,18 +114,16 @@ impl<T: Real> ExtendedFriction<T> {
     /// stuck with, and that depends on how it came to rest more finely than a model can follow. Heat,
     /// wear, age and creep stay as they are.
     pub fn hold(&self, state: &mut ExtendedState<T>, shown_nm: T, input: &ExtendedInput<T>) {
-        let mut torque_nm = shown_nm;
-        if let Some(crosstalk) = &self.effects.bridge_crosstalk {
-            torque_nm -= crosstalk.torque_nm(input.normal_force_n);
-        }
-        if let Some(drift) = &self.effects.bridge_drift {
-            torque_nm = drift.true_torque_nm(torque_nm, state.time_s);
-        }
+        let torque_nm = self.at_rest(state.time_s, input.normal_force_n).undo(shown_nm);
         let mut contact = self.contact(input, state.time_s, T::ONE);
         // What the load can carry includes what the effects make of friction.
         contact.road_factor = self.road_factor(state, &contact, input.disc_angle_rad);
         state.force_n = torque_nm / self.radius_m;
         state.friction = self.friction.holding(state.force_n, &contact);
+    }
+
+    fn at_rest(&self, time_s: T, normal_force_n: T) -> AtRest<'_, T> {
+        AtRest { effects: &self.effects, time_s, normal_force_n }
     }
 
     #[inline]
@@ -175,8 +170,20 @@ impl<T: Real> ExtendedFriction<T> {
     /// Advances everything by one step.
     #[inline]
     pub fn step(&self, state: &mut ExtendedState<T>, input: &ExtendedInput<T>) -> ExtendedOutput<T> {
+        self.step_filtered(state, input, |torque_nm| torque_nm)
+    }
+
+    /// The same with the low-pass of the friction channel's amplifier, which is no effect but the rig's: `low_pass` takes a step.
+    #[inline]
+    pub fn step_filtered(
+        &self,
+        state: &mut ExtendedState<T>,
+        input: &ExtendedInput<T>,
+        low_pass: impl FnMut(T) -> T,
+    ) -> ExtendedOutput<T> {
         let mut friction = state.friction;
-        let output = self.step_around(state, input, |contact| self.friction.step(&mut friction, contact));
+        let force = |contact: &Contact<T>| self.friction.step(&mut friction, contact);
+        let output = self.step_around(state, input, force, low_pass);
         state.friction = friction;
         output
     }
@@ -188,6 +195,7 @@ impl<T: Real> ExtendedFriction<T> {
         state: &mut ExtendedState<T>,
         input: &ExtendedInput<T>,
         contact_force: impl FnOnce(&Contact<T>) -> FrictionForce<T>,
+        low_pass: impl FnMut(T) -> T,
     ) -> ExtendedOutput<T> {
         let effects = &self.effects;
         let step_s = effects.step_s();
@@ -217,30 +225,14 @@ impl<T: Real> ExtendedFriction<T> {
         }
         let film_n = effects.viscous_film.as_ref().map_or(T::ZERO, |film| film.force_n(root_speed_m_s));
         let torque_nm = self.radius_m * (friction.force_n + film_n);
-        ExtendedOutput { torque_nm, shown_nm: self.shown(state, torque_nm, input.normal_force_n) }
-    }
-
-    /// What the friction channel shows.
-    #[inline]
-    fn shown(&self, state: &mut ExtendedState<T>, torque_nm: T, normal_force_n: T) -> T {
-        let effects = &self.effects;
-        let mut shown = torque_nm;
-        if let Some(ring) = &effects.ring_resonance {
-            shown = ring.advance(&mut state.ring, shown);
-        }
-        if let Some(drift) = &effects.bridge_drift {
-            shown = drift.shown_torque_nm(shown, state.time_s);
-        }
-        if let Some(crosstalk) = &effects.bridge_crosstalk {
-            shown += crosstalk.torque_nm(normal_force_n);
-        }
-        if let Some(delay) = &effects.friction_delay {
-            shown = delay.advance(&mut state.past, shown);
-        }
-        if let Some(saturation) = &effects.adc_saturation {
-            shown = saturation.shown_nm(shown);
-        }
-        shown
+        let mut channel = Moving {
+            effects,
+            state: &mut state.channel,
+            time_s,
+            normal_force_n: input.normal_force_n,
+            low_pass,
+        };
+        ExtendedOutput { torque_nm, shown_nm: channel.show(torque_nm) }
     }
 }
 

@@ -5,8 +5,9 @@
 //! The past is kept at the rate of the steps, so the longest delay is [`LONGEST_STEPS`] of them; between
 //! two steps the past is interpolated.
 
-use crate::error::{ParameterError, require};
+use crate::error::ParameterError;
 use crate::real::Real;
+use crate::sensor::DELAY_S;
 
 /// Longest delay in steps: 51 ms at 10 kHz.
 pub const LONGEST_STEPS: usize = 511;
@@ -45,8 +46,7 @@ impl<T: Real> FrictionDelay<T> {
 
     /// Prepares the effect from values in the order of [`Self::NAMES`].
     pub fn new(values: &[T; 1], step_s: T) -> Result<Self, ParameterError> {
-        let allowed = values[0] >= T::ZERO && values[0] <= T::ONE;
-        let delay_s = require("delay_s", values[0], allowed, "0 to 1 s")?;
+        let delay_s = DELAY_S.check("delay_s", values[0])?;
         let mut delay = Self { delay_s, whole_steps: 0, part: T::ZERO };
         delay.set_step_s(step_s);
         Ok(delay)

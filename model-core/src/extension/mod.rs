@@ -11,12 +11,15 @@
 //! [`Contact::road_factor`]: crate::friction::Contact::road_factor
 //!
 //! Each effect can be there once, so any combination is one value without allocation ([`Extensions`]),
-//! and [`ExtendedFriction`] runs them in the order of the rig.
+//! and [`ExtendedFriction`] runs them in the order of the rig; that of the friction channel is [`SensorChain`]'s.
+//!
+//! [`SensorChain`]: crate::sensor::SensorChain
 
 pub mod adc_saturation;
 pub mod bell_curve;
 pub mod bridge_crosstalk;
 pub mod bridge_drift;
+mod channel;
 pub mod direction_asymmetry;
 pub mod disc_angle;
 pub mod encoder_eccentricity;

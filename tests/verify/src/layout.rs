@@ -23,7 +23,7 @@ const FLOORS: [Floor; 10] = [
     floor(
         "models",
         "friction models and effects, no_std",
-        &["model-core/src/friction", "model-core/src/extension"],
+        &["model-core/src/friction", "model-core/src/extension", "model-core/src/sensor"],
     ),
     floor("control core", "loops, supervisor, observer; one step a tick", &["model-core/src/control"]),
     floor("wire", "messages, telemetry, settings", &["model-core/link/src"]),

@@ -9,8 +9,10 @@ use crate::identify::term::{Column, Parameter, Starts};
 pub struct Change {
     /// ln of what friction is multiplied with, per log and point.
     pub log_factor: Option<Column>,
-    /// What the friction channel shows besides friction, N m, per log and point.
-    pub shown_nm: Option<Column>,
+    /// What the friction channel's amplifier adds to the torque, N m, per log and point: drift of its zero, crosstalk.
+    pub zero_nm: Option<Column>,
+    /// What its gain has drifted by, relative, per log and point.
+    pub gain: Option<Column>,
     /// ln of what the friction curve is multiplied with, over [`super::law::speeds`].
     pub log_curve: Option<Vec<f64>>,
     /// Force per slip speed whatever the load, N s/m.
@@ -39,9 +41,14 @@ impl Change {
         add(&mut self.log_factor, columns, sizes);
     }
 
-    /// Adds `size` times a column to what the channel shows.
-    pub fn add_shown(&mut self, columns: &[Column], sizes: &[f64]) {
-        add(&mut self.shown_nm, columns, sizes);
+    /// Adds `size` times a column to the friction channel's zero, N m.
+    pub fn add_zero(&mut self, columns: &[Column], sizes: &[f64]) {
+        add(&mut self.zero_nm, columns, sizes);
+    }
+
+    /// Adds `size` times a column to the friction channel's gain.
+    pub fn add_gain(&mut self, columns: &[Column], sizes: &[f64]) {
+        add(&mut self.gain, columns, sizes);
     }
 }
 
@@ -103,11 +110,12 @@ impl ContactTerm {
         }
     }
 
-    /// The channel shows Σ size × column besides friction.
-    pub fn shown(
+    /// The friction channel's amplifier has Σ size × column as its zero (N m), and as what its gain has drifted by: first the
+    /// sizes of the zero's columns.
+    pub fn amplifier(
         effect: &'static str,
         form: &'static str,
-        columns: Vec<Column>,
+        [zero_nm, gain]: [Vec<Column>; 2],
         parameters: Vec<Parameter>,
     ) -> Self {
         let zero = vec![0.0; parameters.len()];
@@ -119,7 +127,11 @@ impl ContactTerm {
             columns: None,
             law: false,
             export: None,
-            act: Box::new(move |sizes, change| change.add_shown(&columns, sizes)),
+            act: Box::new(move |sizes, change| {
+                let (zeros, gains) = sizes.split_at(zero_nm.len());
+                change.add_zero(&zero_nm, zeros);
+                change.add_gain(&gain, gains);
+            }),
         }
     }
 

@@ -3,6 +3,7 @@
 pub mod baseline;
 mod bristles;
 pub mod change;
+pub mod channel;
 pub mod law;
 pub mod log;
 pub(in crate::identify) mod noise;

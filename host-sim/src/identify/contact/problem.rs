@@ -10,16 +10,16 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::change::{Change, ContactTerm};
+use super::channel::{Channel, ringing};
 use super::law::{Contact, Curve};
-use super::log::{ContactLog, OBSERVED_OVER};
+use super::log::ContactLog;
 pub use super::noise::Noise;
 use super::observer::{Drive, Observed, SLIP_NOISES, observe};
 use super::struck_mode::innovations;
 use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE};
-use crate::identify::filters::{before_mode, exponentials, rms, shifted, smoothed_flat};
+use crate::identify::filters::{exponentials, rms};
 use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
-use crate::predict::SecondOrder;
 
 /// Degrees of freedom of Student's t: tails for what the noise model does not name.
 pub const FREEDOM: f64 = 4.0;
@@ -36,26 +36,6 @@ const SETTLED: f64 = 0.01;
 const MOST_SETTLING: usize = 20;
 /// Slopes are good enough where a step gains more than this share of what they promised.
 const KEPT_PROMISE: f64 = 0.5;
-/// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
-const SIMULATED_MODE: f64 = 0.25;
-
-/// White noise of the channel is at most some twice as large in the force before a mode: 0.9/(ω² w^2.5) for ω in radians per
-/// sample behind a filter of width w.
-const DEVIATION_BEFORE_MODE: f64 = 0.45;
-
-fn rings(hz: f64, step_s: f64) -> bool {
-    hz * step_s < SIMULATED_MODE
-}
-
-/// What a mode (Hz, damping ratio) of the sensor was driven by, from what it shows; `None` where it is too fast to ring from
-/// sample to sample.
-pub fn before_ringing(shown: &[f64], (hz, zeta): (f64, f64), step_s: f64) -> Option<Vec<f64>> {
-    rings(hz, step_s).then(|| {
-        let omega = std::f64::consts::TAU * hz * step_s;
-        let width = (DEVIATION_BEFORE_MODE / (omega * omega)).powf(0.4).max(OBSERVED_OVER);
-        before_mode(shown, omega, zeta, width)
-    })
-}
 
 /// Which number of the contact a baseline parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -284,27 +264,14 @@ impl<'a> Problem<'a> {
         let mut shown_nm = Vec::with_capacity(self.logs.iter().map(ContactLog::len).sum());
         let mut all = Vec::with_capacity(self.logs.len());
         for (at, log) in self.logs.iter().enumerate() {
-            let step_s = log.grid.step_s;
-            let late = (1e-3 * numbers.late_ms + change.late_s) / step_s;
-            let ringing = change.mode.filter(|(hz, _)| rings(*hz, step_s));
             // What the channel adds is taken off first, so that it changes the observed slip too.
-            let seen = match (&change.shown_nm, ringing) {
-                (None, None) => shifted(&log.observed_nm, log.friction_late + late),
-                (added, ringing) => {
-                    let mut seen = log.friction_nm.clone();
-                    if let Some(added) = added {
-                        seen.iter_mut().zip(&added[at]).for_each(|(x, a)| *x -= a);
-                    }
-                    let behind = ringing.and_then(|mode| before_ringing(&seen, mode, step_s));
-                    let behind = behind.unwrap_or_else(|| smoothed_flat(&seen, OBSERVED_OVER));
-                    shifted(&behind, log.friction_late + late)
-                }
-            };
-            let mut force_n: Vec<f64> = seen.iter().map(|t| t / log.radius_m).collect();
+            let mut channel = Channel::new(log, at, change, numbers.late_ms);
+            let seen_nm = channel.seen_nm();
+            let mut force_n: Vec<f64> = seen_nm.iter().map(|t| t / log.radius_m).collect();
             let usual = rms(&log.root_speed_m_s);
             let factor = change.log_factor.as_ref().map(|m| exponentials(&m[at]));
             let drive = Drive {
-                step_s,
+                step_s: log.grid.step_s,
                 interval_s: log.grid.interval_s(),
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
                 load_n: &log.load_n,
@@ -317,34 +284,15 @@ impl<'a> Problem<'a> {
                 ),
             };
             let mut observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
-            if let Some(ends) = change.ends_nm {
-                // At an end of its range the channel says that the force is at least that: the law's own stands in for it.
-                let (low, high) = log.near_ends(ends);
-                for ((seen, force), by_law) in seen.iter().zip(&mut force_n).zip(&observed.force_n) {
-                    if *seen > high {
-                        *force = force.max(*by_law);
-                    } else if *seen < low {
-                        *force = force.min(*by_law);
-                    }
-                }
+            if channel.fill_ends(seen_nm, &mut force_n, &observed.force_n) {
                 observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
             }
-            let mut torque: Vec<f64> = observed.force_n.iter().map(|f| f * log.radius_m).collect();
-            if let Some((hz, zeta)) = ringing {
-                let mut mode = SecondOrder::new(hz, zeta, torque.first().copied().unwrap_or(0.0));
-                torque.iter_mut().for_each(|t| *t = mode.step(step_s, *t));
-            }
-            let mut torque = shifted(&torque, -log.friction_late - late);
-            if let Some(added) = &change.shown_nm {
-                torque.iter_mut().zip(&added[at]).for_each(|(t, a)| *t += a);
-            }
-            if let Some((low, high)) = change.ends_nm {
-                torque.iter_mut().for_each(|t| *t = t.clamp(low, high));
-            }
-            shown_nm.extend(torque);
+            let torque_nm = observed.force_n.iter().map(|f| f * log.radius_m).collect();
+            shown_nm.extend(channel.shown_nm(torque_nm));
             all.push(observed);
         }
-        let ringing = change.mode.filter(|(hz, _)| self.logs.iter().all(|log| rings(*hz, log.grid.step_s)));
+        let rings = |log: &ContactLog| ringing(change.mode, log.grid.step_s);
+        let ringing = change.mode.filter(|_| self.logs.iter().all(|log| rings(log).is_some()));
         Prediction { shown_nm, observed: all, ringing }
     }
 

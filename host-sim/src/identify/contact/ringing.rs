@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use crate::identify::filters::rms;
     use crate::identify::noise::tests::white;
-    use crate::predict::SecondOrder;
+    use model_core::sensor::{SecondOrder, SecondOrderState};
 
     const STEP_S: f64 = 1e-3;
     const NOISE: f64 = 0.01;
@@ -132,15 +132,16 @@ mod tests {
             let late = (t.max(0.0) + count * 0.37 % 1.0) / 300.0;
             if late.floor() as i64 % 2 == 0 { jump } else { 0.0 }
         };
-        let mut mode = SecondOrder::new(hz, 0.02, jump);
+        let mode = SecondOrder::new(hz, 0.02, 0.05 * STEP_S);
+        let mut state = SecondOrderState::holding(jump);
         let noise = white(6000, 5);
         let mut shown = Vec::new();
         for i in 0..6000u32 {
             let t = f64::from(i);
             for j in 1..=20 {
-                mode.step(0.05 * STEP_S, at(t - 1.0 + 0.05 * f64::from(j)));
+                mode.step(&mut state, at(t - 1.0 + 0.05 * f64::from(j)));
             }
-            shown.push(mode.value() + NOISE * noise[i as usize]);
+            shown.push(state.value + NOISE * noise[i as usize]);
         }
         (shown, (0..6000).map(|i| at(f64::from(i))).collect())
     }

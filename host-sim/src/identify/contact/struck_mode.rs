@@ -9,7 +9,7 @@
 //! one that is not there would have to ring after each of its steps: the filter takes off no more than what the force's own
 //! error can have struck, so that it does not take back what the mode was wrong to show.
 
-use crate::predict::SecondOrder;
+use model_core::sensor::SecondOrder;
 
 /// What rings on is no larger than so many deviations of what the force's error keeps up.
 const MOST_DEVIATIONS: f64 = 3.0;
@@ -24,7 +24,7 @@ pub(super) fn innovations(
     of_all: &[f64],
     used: &[bool],
 ) {
-    let [a, b, c, d] = SecondOrder::transition(hz, zeta, step_s);
+    let [[a, b], [c, d]] = SecondOrder::new(hz, zeta, step_s).transition();
     // Response to a unit of force that lasts from one sample to the next.
     let (u, v) = (1.0 - a, -c);
     let (mut x, mut y) = (0.0, 0.0);
@@ -64,15 +64,17 @@ mod tests {
     use super::*;
     use crate::identify::filters::rms;
     use crate::identify::noise::tests::white;
+    use model_core::sensor::SecondOrderState;
 
     const STEP_S: f64 = 1e-3;
     const NOISE: f64 = 0.02;
 
     /// White noise of the sensor beside a mode that a white force strikes.
     fn struck(mode: (f64, f64), force: f64) -> Vec<f64> {
-        let mut ring = SecondOrder::new(mode.0, mode.1, 0.0);
+        let ring = SecondOrder::new(mode.0, mode.1, STEP_S);
+        let mut state = SecondOrderState::holding(0.0);
         let each = white(20_000, 1).into_iter().zip(white(20_000, 2));
-        each.map(|(u, n)| ring.step(STEP_S, force * u) + NOISE * n).collect()
+        each.map(|(u, n)| ring.step(&mut state, force * u) + NOISE * n).collect()
     }
 
     fn left(mode: (f64, f64), force: f64, residual: &[f64]) -> Vec<f64> {

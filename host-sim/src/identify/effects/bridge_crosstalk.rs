@@ -29,7 +29,7 @@ impl Effect for BridgeCrosstalk {
             let names = ["gain_nm_per_n", "bend_nm_per_n2"].map(String::from);
             names.into_iter().zip([p[0] * torque / load, p[1] * torque / (load * load)]).collect()
         };
-        vec![ContactTerm::shown(self.id(), "", columns, parameters).exported(move |p, _| export(p))]
+        vec![ContactTerm::amplifier(self.id(), "", [columns, Vec::new()], parameters).exported(move |p, _| export(p))]
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {

@@ -71,16 +71,14 @@ impl Effect for BridgeDrift {
             view.coordinates.iter().enumerate().map(column).collect()
         };
         let zero = |_: usize, _: usize| s.torque_nm;
-        let gain = |at: usize, i: usize| view.logs[at].smooth_nm[i];
-        let friction: Vec<Column> =
-            BENDS.iter().map(|b| over_time(*b, &zero)).chain(BENDS.iter().map(|b| over_time(*b, &gain))).collect();
+        let gain = |_: usize, _: usize| 1.0;
+        let friction = [&zero as &dyn Fn(usize, usize) -> f64, &gain].map(|of| BENDS.map(|b| over_time(b, of)).to_vec());
         // An error of the load is a factor of friction the other way.
         let load_zero = |at: usize, i: usize| s.load_n / view.logs[at].load_n[i].max(0.06 * s.load_n);
-        let load_gain = |_: usize, _: usize| 1.0;
         let normal: Vec<Column> = BENDS
             .iter()
             .map(|b| over_time(*b, &load_zero))
-            .chain(BENDS.iter().map(|b| over_time(*b, &load_gain)))
+            .chain(BENDS.iter().map(|b| over_time(*b, &gain)))
             .collect();
         let named = |bridge: &str| -> Vec<Parameter> {
             let kinds = ["zero", "gain"].into_iter();
@@ -89,7 +87,7 @@ impl Effect for BridgeDrift {
                 .collect()
         };
         vec![
-            ContactTerm::shown(self.id(), "friction", friction, named("friction"))
+            ContactTerm::amplifier(self.id(), "friction", friction, named("friction"))
                 .exported(move |p, _| export(p, "friction", s_time, s_torque)),
             ContactTerm::factor(self.id(), "normal", normal, named("normal"))
                 .exported(move |p, _| export(p, "normal", s_time, s_load)),

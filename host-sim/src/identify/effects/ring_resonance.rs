@@ -2,15 +2,19 @@
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::channel::{FASTEST_MODE_HZ, SLOWEST_MODE_HZ};
 use crate::identify::spectrum::Spectrum;
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
 pub(super) struct RingResonance;
 
+/// Damping ratios: below, it rings on for a second and more; above, it is a delay.
+const DAMPING: (f64, f64) = (2e-3, 0.7);
+
 /// Frequency and damping ratio.
 fn mode(p: &[f64]) -> (f64, f64) {
-    (p[0].exp().clamp(5.0, 249.0), p[1].exp().clamp(2e-3, 0.7))
+    (p[0].exp().clamp(SLOWEST_MODE_HZ, FASTEST_MODE_HZ), p[1].exp().clamp(DAMPING.0, DAMPING.1))
 }
 
 /// Peaks of each log's spectrum.
@@ -19,7 +23,7 @@ fn peaks_hz(view: &ContactView<'_>) -> impl Iterator<Item = f64> {
     const PEAKS: usize = 8;
     view.logs.iter().flat_map(|log| {
         let peaks = Spectrum::new(&log.friction_nm).map_or(Vec::new(), |spectrum| spectrum.peaks(PEAKS));
-        peaks.into_iter().map(|f| f / log.grid.step_s).filter(|hz| *hz > 5.0)
+        peaks.into_iter().map(|f| f / log.grid.step_s).filter(|hz| *hz > SLOWEST_MODE_HZ)
     })
 }
 
