@@ -9,8 +9,8 @@
 //! speed, as on a wheel; a block that is held fast has no transport, and costs the same.
 //!
 //! predicted = r·Σ F_i with its effects, as a friction channel with a second order Butterworth low-pass like the bridge's
-//! amplifier shows it ([`crate::sensor::SensorChain`]), so that measurement and prediction are late by the same time. residual = measured − predicted, with a running mean
-//! square (one pole; its root is taken by whoever shows it).
+//! amplifier shows it ([`crate::sensor::SensorChain`]), so that measurement and prediction are late by the same time.
+//! residual = measured − predicted, with a running mean square (one pole; its root is taken by whoever shows it).
 //!
 //! Left out: the torque ring's own mode (600 Hz), which is fast against anything the model predicts.
 
