@@ -68,7 +68,10 @@ pub fn diagnose(
         Some(contact) => {
             progress("extended model");
             let place = judgement.place(Part::Friction).unwrap_or(0);
-            let extended = extended_model::contact(contact, place, model)?;
+            let mut extended = extended_model::contact(contact, place, model)?;
+            if contact.disc_cause.is_none() {
+                extended = extended.fitted(model, rig, train, &|| ());
+            }
             values.extend(extended.values);
             extended.model.to_toml() + &extended_model::remarks(&judgement)
         }

@@ -12,10 +12,12 @@ use super::contact::baseline::has_block;
 use super::contact::log::ContactLog;
 use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
-use super::fit_interval;
 use super::judge::{ContactPart, Judgement, Linear, Part};
+use super::{fit_contact, fit_interval, fit_parameters};
+use crate::files::log::Log;
 use crate::files::model_file::{Extension, ModelFile, ModelKind};
 use crate::files::number;
+use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
 
 /// Step of the finite differences that carry a covariance through a law.
@@ -125,6 +127,27 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
         }
     }
     Ok(ExtendedContact { model: extended, values })
+}
+
+impl ExtendedContact {
+    /// What turned out to be a model of another kind, without an effect around it, is fitted as `rig fit` does: its simulation
+    /// goes between the samples, where the observed slip draws a block's damping towards F_N |g′|. Where that fit refuses, the
+    /// numbers stand as they were found.
+    pub fn fitted(self, told: &ModelFile, rig: &RigFile, logs: &[Log], progress: &(dyn Fn() + Sync)) -> Self {
+        if self.model.kind == told.kind || !self.model.extensions.is_empty() {
+            return self;
+        }
+        let free = fit_parameters::default_free(&self.model);
+        let Ok(fit) = fit_contact::refine(&self.model, rig, logs, &free, progress) else { return self };
+        let Self { mut values, .. } = self;
+        for (at, name) in fit.names.iter().enumerate() {
+            let std = fit.ends[at].map(|_| fit.std[at]);
+            for own in values.values_mut().filter_map(|entry| entry.get_mut(name)) {
+                *own = Value { value: fit.values[at], std };
+            }
+        }
+        Self { model: fit.model, values }
+    }
 }
 
 /// Of all fitted values, from blocks of the residuals: what strikes a few load steps is known by those few.

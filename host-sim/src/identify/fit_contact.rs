@@ -116,8 +116,12 @@ fn examined(problem: &Problem<'_>, p: &[f64]) -> Result<f64, FitError> {
     }
 }
 
+fn of_file(baseline: &Baseline) -> Vec<f64> {
+    baseline.free.iter().map(|base| base.parameter.mean).collect()
+}
+
 fn starts(baseline: &Baseline) -> Vec<Vec<f64>> {
-    let file: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+    let file = of_file(baseline);
     let moved = SPREAD.iter().map(|factors| {
         let off = |role: Role| match role {
             Role::V0 => factors[0],
@@ -150,6 +154,31 @@ fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, progress: &(
 /// # Errors
 /// Logs without the columns; parameters that are unknown, that these logs do not show, or that they cannot part.
 pub fn identify(
+    model: &ModelFile,
+    rig: &RigFile,
+    logs: &[Log],
+    free: &[String],
+    progress: &(dyn Fn() + Sync),
+) -> Result<ContactFit, InputError> {
+    identify_from(starts, model, rig, logs, free, progress)
+}
+
+/// As [`identify`], from the model's own numbers alone: they are those of an optimum.
+///
+/// # Errors
+/// As [`identify`].
+pub fn refine(
+    model: &ModelFile,
+    rig: &RigFile,
+    logs: &[Log],
+    free: &[String],
+    progress: &(dyn Fn() + Sync),
+) -> Result<ContactFit, InputError> {
+    identify_from(|baseline| vec![of_file(baseline)], model, rig, logs, free, progress)
+}
+
+fn identify_from(
+    starts: impl Fn(&Baseline) -> Vec<Vec<f64>>,
     model: &ModelFile,
     rig: &RigFile,
     logs: &[Log],
