@@ -274,7 +274,7 @@ pub struct TooSmall {
     pub effect: &'static str,
     /// What it changes, relative to the signal.
     pub size: f64,
-    /// What it would have to change: by the form of the model, by the law of a larger cause beside it, by what it leaves.
+    /// What it would have to exceed: the form of the model and of a larger cause beside it.
     pub floor: f64,
 }
 
@@ -599,9 +599,8 @@ fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
                         .filter(|(other, _)| *other != own);
                     let wrong_by = others.map(|(_, (other, form))| other.size * form).fold(0.0, f64::max);
                     sizes[at] = sizes[at].max(what.size);
-                    // What a second cause adds may be the first one's form, and what explains less than it leaves may be part
-                    // of what is not understood.
-                    let over = (what.size / MODEL_FORM.max(wrong_by)).min(what.over_rest);
+                    // What a second cause adds may be the first one's form.
+                    let over = what.over_form(MODEL_FORM.max(wrong_by));
                     over_floor[at] = over_floor[at].max(over);
                 }
             }
@@ -735,25 +734,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cause_explains_more_than_it_leaves() {
-        // Two sets in one balance; the second cause is large enough and its evidence is sure.
-        let told = |over_rest: f64| {
+    fn a_small_cause_that_leaves_more_than_it_explains_is_a_form() {
+        // Two sets in one balance; the evidence of the second cause is sure.
+        let told = |size: f64, over_rest: f64| {
             let candidate = |effects: &[&'static str], log_evidence: f64, place: usize| Candidate {
                 effects: effects.to_vec(),
                 log_evidence,
                 place,
-                contributions: effects
-                    .iter()
-                    .map(|e| Contribution { size: 0.05, over_rest: if *e == "b" { over_rest } else { 9.0 } })
-                    .collect(),
+                contributions: [Contribution { size: 0.1, over_rest: 9.0 }, Contribution { size, over_rest }]
+                    [..effects.len()]
+                    .to_vec(),
                 forms: vec![LAW_FORM; effects.len()],
             };
             let candidates = vec![candidate(&["a", "b"], 50.0, 0), candidate(&["a"], 0.0, 1)];
             table(&[(Part::Friction, candidates)]).0[0].clone()
         };
-        assert_eq!(told(3.0).effects, ["a", "b"]);
-        assert!(told(3.0).probability > 0.99 && (told(1.0).probability - 0.5).abs() < 0.01);
-        assert_eq!(told(0.8).effects, ["a"]);
+        assert_eq!(told(0.02, 3.0).effects, ["a", "b"]);
+        assert!(told(0.02, 3.0).probability > 0.98);
+        // One that leaves nearly twice what it explains: hardly better than even odds.
+        assert!((0.5..0.7).contains(&told(0.02, 0.55).probability));
+        assert_eq!(told(0.02, 0.4).effects, ["a"]);
+        // A large one is none, whatever another cause leaves beside it.
+        assert_eq!(told(0.05, 0.1).effects, ["a", "b"]);
     }
 
     #[test]

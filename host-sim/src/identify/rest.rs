@@ -13,7 +13,7 @@ use super::judge::{ContactPart, DiscCause};
 const BLOCKS_S: [f64; 2] = [0.05, 0.005];
 /// Deviations from named sources are known within this factor before anything is fitted to the residuals.
 const NAMED_WITHIN: f64 = 1.5;
-/// A rest is beyond the form of a model where it is this many times [`MODEL_FORM`] of the signal: what a wrong law leaves.
+/// What a form is known to, [`MODEL_FORM`] of the signal or a share of a cause, so many times is beyond it, whatever its shape.
 const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
 const MOST: f64 = 0.5;
@@ -69,6 +69,12 @@ impl Contribution {
             f64::INFINITY
         };
         Self { size, over_rest }
+    }
+
+    /// Its size over what a form that is known to `form` may look like: one that leaves more than it explains has the wrong
+    /// shape, and is then so much more likely a form; up to where nothing is.
+    pub fn over_form(&self, form: f64) -> f64 {
+        self.size / (form * self.over_rest.recip().clamp(1.0, BEYOND_FORM))
     }
 }
 
@@ -165,22 +171,24 @@ impl Ground {
     /// What is structured over long blocks, short ones or from sample to sample, whichever is most, with what noise leaves
     /// there.
     fn structured(&self, residual: &[f64]) -> (f64, f64) {
-        let [long, short] = self.blocks.map(|block| structured(residual, &self.noise, &self.rows, block));
+        self.beyond(&self.noise, residual)
+    }
+
+    /// The same beyond this noise of blocks.
+    fn beyond(&self, noise: &Noise, residual: &[f64]) -> (f64, f64) {
+        let [long, short] = self.blocks.map(|block| structured(residual, noise, &self.rows, block));
         let each = self.of_sample.as_ref().map(|noise| structured(residual, noise, &self.rows, 1));
         [short].into_iter().chain(each).fold(long, |most, other| if other.0 > most.0 { other } else { most })
     }
 
-    /// RMS of what a fit leaves beyond noise, over that of the signal.
-    pub fn size(&self, problem: &Problem<'_>, fit: &Fit) -> f64 {
-        self.structured(&self.left(problem, fit)).0.sqrt() / self.signal
-    }
-
-    /// What each cause of a fit does, from the fits without it.
+    /// What each cause of a fit does, from the fits without it. What is named of a block stays in both rests: where a transition
+    /// is uncertain a wrong shape shows all the same.
     pub fn contributions(&self, problem: &Problem<'_>, fit: &Fit, without: &[Fit]) -> Vec<Contribution> {
-        let with = self.size(problem, fit);
-        let own = |left: &Fit| {
-            Contribution::new(search::difference(problem, &fit.r, &left.r), with, self.size(problem, left))
-        };
+        let white = Noise::white(self.noise.white.clone());
+        let rest = |fit: &Fit| self.beyond(&white, &self.left(problem, fit)).0.sqrt();
+        let with = rest(fit);
+        let own =
+            |left: &Fit| Contribution::new(search::difference(problem, &fit.r, &left.r), with, rest(left));
         without.iter().map(own).collect()
     }
 

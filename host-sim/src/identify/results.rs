@@ -345,8 +345,8 @@ fn rejected(judged: &Judgement, verdict: &str, marginal: &dyn Fn(&str) -> f64) -
         let small = judged.too_small.iter().find(|small| small.effect == effect);
         let why = match (with, small) {
             (_, Some(small)) => format!(
-                "it would change the prediction by {} of the signal, and would have to by {} for what the form of the model, \
-                 the law of a larger cause and what it leaves itself leave open",
+                "it would change the prediction by {} of the signal, less than the {} that the form of the model and the law of \
+                 a larger cause leave open",
                 percent(small.size),
                 percent(small.floor)
             ),
