@@ -55,7 +55,8 @@ impl Rest {
 pub struct Contribution {
     /// Change of the prediction when it is taken out and the others are fitted again, relative to the signal.
     pub size: f64,
-    /// Amplitude of the structured rest that it explains over that which the whole set leaves.
+    /// Amplitude of the structured rest that it explains over that which the whole set leaves; in a linear balance its change of
+    /// the prediction over half of that.
     pub over_rest: f64,
 }
 
@@ -304,17 +305,14 @@ fn follows(
     out
 }
 
-/// What an alternative does in a linear balance: its size, relative to the signal, from the residuals with and without it. What
-/// is left lasts, or it rattles from row to row, as play does: whichever is most.
+/// What an alternative does in a linear balance: its size, relative to the signal, from the residuals with and without it. Its
+/// columns do not take each other's shape as laws of friction do; that it is no trace of what is left is enough.
 pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
-    let most = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
-    let (noise, of_row) = (Noise::white(balance.first_deviation.clone()), Noise::white(most));
-    let [with, left] = [residual, without].map(|residual| {
-        let long = structured(residual, &noise, &balance.used, block).0;
-        long.max(structured(residual, &of_row, &balance.used, 1).0).sqrt()
-    });
-    Contribution::new(balance.difference(residual, without) / signal.max(1e-12), with, left)
+    let noise = Noise::white(balance.first_deviation.clone());
+    let left = structured(residual, &noise, &balance.used, block).0.sqrt();
+    let change = balance.difference(residual, without);
+    Contribution { size: change / signal.max(1e-12), over_rest: change / (MOST * left) }
 }
 
 /// Of a linear balance. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.
