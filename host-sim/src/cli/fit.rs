@@ -20,7 +20,7 @@ use crate::files::signal::Signal;
 use crate::fit::covariance::INTERVAL_95;
 use crate::fit::drive::inverse::{DriveFit, Friction, Motion, identify};
 use crate::fit::drive::record::DriveRecord;
-use crate::identify::fit_contact::{self, ContactFit};
+use crate::identify::fit_contact::{self, Begin, ContactFit};
 use crate::identify::fit_parameters;
 use crate::input_error::InputError;
 use crate::predict::drive_model;
@@ -241,7 +241,7 @@ impl Fit {
             rounds.fetch_add(1, Ordering::Relaxed);
             bar.lock().unwrap_or_else(PoisonError::into_inner).advance(1);
         };
-        let fit = fit_contact::identify(&model, &rig, logs, &free, &progress)?;
+        let fit = fit_contact::identify(&model, &rig, logs, &free, Begin::Around, &progress)?;
         drop(bar);
         write_contact(output, &fit, logs, &rig, rounds.into_inner())
     }

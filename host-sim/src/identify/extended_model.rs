@@ -12,8 +12,9 @@ use super::contact::baseline::has_block;
 use super::contact::log::ContactLog;
 use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
+use super::fit_contact::{self, Begin};
 use super::judge::{ContactPart, Judgement, Linear, Part};
-use super::{fit_contact, fit_interval, fit_parameters};
+use super::{fit_interval, fit_parameters};
 use crate::files::log::Log;
 use crate::files::model_file::{Extension, ModelFile, ModelKind};
 use crate::files::number;
@@ -138,7 +139,8 @@ impl ExtendedContact {
             return self;
         }
         let free = fit_parameters::default_free(&self.model);
-        let Ok(fit) = fit_contact::refine(&self.model, rig, logs, &free, progress) else { return self };
+        let fit = fit_contact::identify(&self.model, rig, logs, &free, Begin::There, progress);
+        let Ok(fit) = fit else { return self };
         let Self { mut values, .. } = self;
         for (at, name) in fit.names.iter().enumerate() {
             let std = fit.ends[at].map(|_| fit.std[at]);

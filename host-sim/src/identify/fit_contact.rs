@@ -116,13 +116,11 @@ fn examined(problem: &Problem<'_>, p: &[f64]) -> Result<f64, FitError> {
     }
 }
 
-fn of_file(baseline: &Baseline) -> Vec<f64> {
-    baseline.free.iter().map(|base| base.parameter.mean).collect()
-}
-
-fn starts(baseline: &Baseline) -> Vec<Vec<f64>> {
-    let file = of_file(baseline);
-    let moved = SPREAD.iter().map(|factors| {
+/// The first is at the file's numbers.
+fn starts(baseline: &Baseline, begin: Begin) -> Vec<Vec<f64>> {
+    let file: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+    let spread: &[[f64; 3]] = if begin == Begin::Around { &SPREAD } else { &[] };
+    let moved = spread.iter().map(|factors| {
         let off = |role: Role| match role {
             Role::V0 => factors[0],
             Role::Stiffness => factors[1],
@@ -149,6 +147,15 @@ fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, progress: &(
     best
 }
 
+/// Where the search begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Begin {
+    /// At the file's numbers and at others around them.
+    Around,
+    /// At the file's numbers alone: they are those of an optimum.
+    There,
+}
+
 /// Identifies the parameters `free` of `model` from logs. `progress` hears of every round of the search.
 ///
 /// # Errors
@@ -158,31 +165,7 @@ pub fn identify(
     rig: &RigFile,
     logs: &[Log],
     free: &[String],
-    progress: &(dyn Fn() + Sync),
-) -> Result<ContactFit, InputError> {
-    identify_from(starts, model, rig, logs, free, progress)
-}
-
-/// As [`identify`], from the model's own numbers alone: they are those of an optimum.
-///
-/// # Errors
-/// As [`identify`].
-pub fn refine(
-    model: &ModelFile,
-    rig: &RigFile,
-    logs: &[Log],
-    free: &[String],
-    progress: &(dyn Fn() + Sync),
-) -> Result<ContactFit, InputError> {
-    identify_from(|baseline| vec![of_file(baseline)], model, rig, logs, free, progress)
-}
-
-fn identify_from(
-    starts: impl Fn(&Baseline) -> Vec<Vec<f64>>,
-    model: &ModelFile,
-    rig: &RigFile,
-    logs: &[Log],
-    free: &[String],
+    begin: Begin,
     progress: &(dyn Fn() + Sync),
 ) -> Result<ContactFit, InputError> {
     let refuse = |why: FitError| InputError::new(why.to_string()).file(model.source.as_str());
@@ -195,7 +178,7 @@ fn identify_from(
         return Err(refuse(FitError::TooFewSamples { samples, needed }));
     }
     let mut problem = Problem::new(&logs, &baseline, &[]);
-    let starts = starts(&baseline);
+    let starts = starts(&baseline, begin);
     examined(&problem, &starts[0]).map_err(refuse)?;
 
     let mut found: Vec<Fit> =
@@ -396,7 +379,7 @@ mod tests {
     fn fitted(truth: &ModelFile, guess: &ModelFile, sticking: bool) -> Result<ContactFit, InputError> {
         let rig = RigFile::assumed_rig(&[]).unwrap();
         let logs = [log(truth, &rig, sticking, 1), log(truth, &rig, sticking, 2)];
-        identify(guess, &rig, &logs, &default_free(guess), &|| ())
+        identify(guess, &rig, &logs, &default_free(guess), Begin::Around, &|| ())
     }
 
     #[test]
@@ -457,7 +440,7 @@ mod tests {
         let rig = RigFile::assumed_rig(&[]).unwrap();
         let logs = [log(&lugre(), &rig, true, 4)];
         let free: Vec<String> = ["theta", "a0", "a1", "v0_m_s"].map(String::from).to_vec();
-        let error = identify(&lugre(), &rig, &logs, &free, &|| ()).unwrap_err().to_string();
+        let error = identify(&lugre(), &rig, &logs, &free, Begin::Around, &|| ()).unwrap_err().to_string();
         for name in ["theta", "a0", "a1", "cannot be told apart"] {
             assert!(error.contains(name), "{error}");
         }
@@ -468,8 +451,11 @@ mod tests {
         let rig = RigFile::assumed_rig(&[]).unwrap();
         let logs = [log(&lugre(), &rig, true, 4)];
         let series = ModelFile::assumed(&[]).unwrap();
-        let refused =
-            |name: &str| identify(&series, &rig, &logs, &[name.to_string()], &|| ()).unwrap_err().to_string();
+        let refused = |name: &str| {
+            identify(&series, &rig, &logs, &[name.to_string()], Begin::Around, &|| ())
+                .unwrap_err()
+                .to_string()
+        };
         assert!(refused("sigma0_n_per_m").contains("sigma0_n_per_m cannot be identified"));
         assert!(refused("stiffness").contains("stiffness: unknown parameter; allowed: sigma0_n_per_m"));
     }

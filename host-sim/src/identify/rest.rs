@@ -17,6 +17,8 @@ const NAMED_WITHIN: f64 = 1.5;
 const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
 const MOST: f64 = 0.5;
+/// In a linear balance a cause that changes the prediction by less than this share of what is left may be a part of that.
+const LEFT_SHARE: f64 = 0.5;
 /// It is a trace where it is less than this share of the baseline's mean square: a fifth of its amplitude.
 const LEAST_SHARE: f64 = 0.05;
 /// Steepness of the steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
@@ -55,13 +57,13 @@ impl Rest {
 pub struct Contribution {
     /// Change of the prediction when it is taken out and the others are fitted again, relative to the signal.
     pub size: f64,
-    /// Amplitude of the structured rest that it explains over that which the whole set leaves; in a linear balance its change of
-    /// the prediction over half of that.
+    /// How clearly it stands out of what the whole set leaves: from 1 on it does. In the contact the amplitude of the structured
+    /// rest that it explains over that which is left, in a linear balance its change of the prediction over half of that.
     pub over_rest: f64,
 }
 
 impl Contribution {
-    /// From the size, and the structured rests with and without it.
+    /// In the contact, from the size and the structured rests with and without it.
     fn new(size: f64, with: f64, without: f64) -> Self {
         // Where nothing is structured without it either, its size alone is what is known of it.
         let over_rest = if without > 0.0 {
@@ -306,13 +308,13 @@ fn follows(
 }
 
 /// What an alternative does in a linear balance: its size, relative to the signal, from the residuals with and without it. Its
-/// columns do not take each other's shape as laws of friction do; that it is no trace of what is left is enough.
+/// columns do not take each other's shape as laws of friction do; that it is no small part of what is left is enough.
 pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
     let noise = Noise::white(balance.first_deviation.clone());
     let left = structured(residual, &noise, &balance.used, block).0.sqrt();
     let change = balance.difference(residual, without);
-    Contribution { size: change / signal.max(1e-12), over_rest: change / (MOST * left) }
+    Contribution { size: change / signal.max(1e-12), over_rest: change / (LEFT_SHARE * left) }
 }
 
 /// Of a linear balance. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.

@@ -7,7 +7,8 @@
 use host_sim::files::log::Log;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
-use host_sim::identify::{fit_contact::identify, fit_parameters::default_free};
+use host_sim::identify::fit_contact::{Begin, identify};
+use host_sim::identify::fit_parameters::default_free;
 use rig_tests::rig::Friction;
 use rig_tests::{Base, Scenario, generate};
 
@@ -31,7 +32,7 @@ fn errors(seed: u64) -> [(bool, f64); 5] {
     let model = ModelFile::parse("model.toml", &case.model_toml).unwrap();
     let logs: Vec<Log> =
         case.train.iter().map(|text| Log::parse_csv("train.csv", text.as_bytes()).unwrap()).collect();
-    let fit = identify(&model, &rig, &logs, &default_free(&model), &|| ()).unwrap();
+    let fit = identify(&model, &rig, &logs, &default_free(&model), Begin::Around, &|| ()).unwrap();
     let friction = case.truth.friction.unwrap();
     NAMES.map(|name| {
         let at = fit.names.iter().position(|n| n == name).unwrap();
