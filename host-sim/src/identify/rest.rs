@@ -242,7 +242,12 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
         times_noise: rest / left.max(1e-300),
-        follows: follows(&residual, &ground.rows, ground.blocks[0], &contact_quantities(contact)),
+        follows: if rest > 0.0 {
+            follows(&residual, &ground.rows, ground.blocks[0], &contact_quantities(contact))
+        } else {
+            // Of what noise leaves nothing can be said to follow.
+            Vec::new()
+        },
     }
 }
 

@@ -99,8 +99,8 @@ fn draw_panel(
         .axis_style(INK)
         .label_style(text.clone())
         .axis_desc_style(text)
-        .x_label_formatter(&move |x| super::value::plain(if log_x { 10f64.powf(*x) } else { *x }))
-        .y_label_formatter(&|y| super::value::plain(*y))
+        .x_label_formatter(&move |at| if log_x { super::value::plain(10f64.powf(*at)) } else { tick(*at, x) })
+        .y_label_formatter(&|at| tick(*at, y))
         .x_desc(if last { chart.x_title.as_str() } else { "" })
         .y_desc(panel.y_title.as_str())
         .draw()?;
@@ -117,6 +117,12 @@ fn draw_panel(
         .label_font(("sans-serif", 12).into_font().color(&INK))
         .draw()?;
     Ok(())
+}
+
+/// Label of a tick of a linear axis: zero is a sum of steps that do not add up to it in the last place.
+fn tick(at: f64, (low, high): (f64, f64)) -> String {
+    let rounding = 1e-9 * (high - low);
+    super::value::plain(if at.abs() < rounding { 0.0 } else { at })
 }
 
 /// First and last place of a rising abscissa within a range.
@@ -180,6 +186,14 @@ fn every(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
     use crate::report::{Line, Role, Window};
+
+    #[test]
+    fn a_tick_at_zero_says_so() {
+        let steps = -0.3 + 0.1 + 0.1 + 0.1;
+        assert!(steps != 0.0);
+        assert_eq!(tick(steps, (-0.3, 0.2)), "0");
+        assert_eq!(tick(2.5e-16, (0.0, 1e-15)), "2.500e-16");
+    }
 
     fn chart() -> Chart {
         let x: Vec<f64> = (0..20_000).map(|k| f64::from(k) * 1e-3).collect();
