@@ -10,7 +10,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::contact::log::{ContactLog, OBSERVED_OVER};
-use super::contact::problem::{Baseline, Fit, Problem, Role};
+use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
+use super::filters::rms;
 use super::fit_interval::covariance;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_posterior::{points, quantile, spread};
@@ -223,7 +224,9 @@ pub fn identify(
             .filter(|w| *w > 0.0)
     });
     let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
-    let points = points(&baseline, &fit.p, &of_p, slid.collect(), smoothing_s);
+    let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
+    let known_to = (smoothing_s, DRIFT * usual_m_s);
+    let points = points(&baseline, &fit.p, &of_p, slid.collect(), known_to);
     let values = values(model, &baseline, &fit.p, free);
     let uncertain = match &points {
         Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),

@@ -16,7 +16,8 @@ use super::contact::problem::{Baseline, Role};
 use super::linear;
 
 /// What the engine itself is wrong by, deviations in ln: of the curve at each of the speeds, from what it leaves at the
-/// true numbers of rigs without an effect (means over bins of speed are off by 1e-4 to 4e-4 of the friction), …
+/// true numbers of rigs without an effect (means over bins of speed are off by 1e-4 to 4e-4 of the friction, beside what an
+/// error of the slip makes of slow ones), …
 const CURVE_FORM: f64 = 4e-4;
 /// … of the stiffness, …
 const STIFFNESS_FORM: f64 = 1e-3;
@@ -58,6 +59,17 @@ impl Seen<'_> {
         DVector::from_iterator(p.len(), curve.chain(rest))
     }
 
+    /// How much ln g changes from a slip of this error, at each of the speeds.
+    fn of_slip_error(&self, p: &[f64], error_m_s: f64) -> Vec<f64> {
+        let there = self.at(p);
+        let moved = Seen {
+            baseline: self.baseline,
+            speeds_m_s: self.speeds_m_s.iter().map(|w| w + error_m_s).collect(),
+        };
+        let here = moved.at(p);
+        (0..self.speeds_m_s.len()).map(|i| here[i] - there[i]).collect()
+    }
+
     fn derivatives(&self, p: &[f64]) -> DMatrix<f64> {
         let columns: Vec<DVector<f64>> = (0..p.len())
             .map(|i| {
@@ -85,14 +97,14 @@ fn speeds(mut slid_m_s: Vec<f64>, count: usize) -> Option<Vec<f64>> {
 }
 
 /// Points of the posterior of the baseline's values about its top `p`; `covariance` is that of the likelihood alone there, for
-/// a slip that is smoothed over this width.
+/// a slip that is smoothed over this width and known to this error.
 /// `None` where what is seen has no inverse, as in sliding at one speed.
 pub(super) fn points(
     baseline: &Baseline,
     p: &[f64],
     covariance: &DMatrix<f64>,
     slid_m_s: Vec<f64>,
-    smoothing_s: f64,
+    (smoothing_s, slip_error_m_s): (f64, f64),
 ) -> Option<Vec<Vec<f64>>> {
     let n = p.len();
     let count = baseline.free.iter().filter(|base| Seen::is_curve(base.role)).count();
@@ -107,7 +119,8 @@ pub(super) fn points(
     let rest = baseline.free.iter().map(|base| base.role).filter(|role| !Seen::is_curve(*role));
     let numbers = baseline.numbers(p);
     let width = smoothing_s * numbers.stiffness_n_per_m / numbers.damping_n_s_per_m.max(f64::MIN_POSITIVE);
-    let form = std::iter::repeat_n(CURVE_FORM, count).chain(rest.map(|role| match role {
+    let curve = seen.of_slip_error(p, slip_error_m_s).into_iter().map(|error| error.hypot(CURVE_FORM));
+    let form = curve.chain(rest.map(|role| match role {
         Role::Stiffness => STIFFNESS_FORM,
         Role::Damping => (DAMPING_FORM * width * width).min(1.0),
         _ => 0.0,
@@ -206,7 +219,7 @@ mod tests {
         };
         let of = |deviation: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
-            let points = points(&baseline, &p, &covariance, slid(), 0.0).unwrap();
+            let points = points(&baseline, &p, &covariance, slid(), (0.0, 0.0)).unwrap();
             let mut v0: Vec<f64> = points.iter().map(|q| q[2] - p[2]).collect();
             (quantile(&mut v0, 0.025), quantile(&mut v0, 0.975))
         };

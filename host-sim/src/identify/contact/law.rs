@@ -56,6 +56,18 @@ impl Curve {
         self.values[ENTRIES - 1]
     }
 
+    /// g′(w) within a cell of the table, 1/(m/s).
+    #[inline]
+    pub fn derivative(&self, slip_m_s: f64) -> f64 {
+        let bits = slip_m_s.max(SLOWEST_M_S).to_bits() >> REST_BITS;
+        let cell = (bits - (SLOWEST_M_S.to_bits() >> REST_BITS)) as usize;
+        if cell + 2 >= ENTRIES {
+            return 0.0;
+        }
+        let width = f64::from_bits((bits + 1) << REST_BITS) - f64::from_bits(bits << REST_BITS);
+        (self.values[cell + 2] - self.values[cell + 1]) / width
+    }
+
     /// |g′(w)|, 1/(m/s).
     pub fn slope(&self, slip_m_s: f64) -> f64 {
         let (low, high) = (slip_m_s * 0.95, slip_m_s * 1.05);
@@ -134,6 +146,9 @@ mod tests {
             (curve.slope(0.1) - 0.6 * 0.5 / (0.1f64 * 0.3).sqrt() * (-(0.1f64 / 0.3).sqrt()).exp()).abs()
                 < 2e-3
         );
+        let slope = curve.derivative(0.1);
+        assert!((slope / -curve.slope(0.1) - 1.0).abs() < 0.02, "{slope}");
+        assert_eq!(curve.derivative(40.0), 0.0);
         assert_eq!(curve.at(0.0), curve.values[0]);
     }
 }

@@ -38,6 +38,11 @@ const MODEL_FORM_SOURCE: usize = 4;
 const ROOT_MOTION_SOURCE: usize = 6;
 /// Sources that are errors of the force before its sensor: load between samples, form of the model, slip speed, root's motion.
 const OF_FORCE: std::ops::Range<usize> = 3..7;
+/// Samples of a cycle of slip and stick below which its jumps run into each other: each is uncertain over the smoothing's width
+/// and the two samples beside it, and there are two in a cycle.
+const SAMPLES_PER_CYCLE: f64 = 10.0;
+/// Sources that are errors of the channel, from which the slip is observed too: the sensor's, motion between samples.
+const OF_CHANNEL: std::ops::Range<usize> = 0..3;
 /// Least certainty of a sample that takes part: the way's noise is up to three quarters of the variance.
 const LEAST_CERTAINTY: f64 = 0.5;
 /// Frequency below which effects live, Hz; above it residuals only tell how white they are.
@@ -48,8 +53,9 @@ const SLOW_HZ: f64 = 30.0;
 pub struct Noise {
     /// Deviation of each sample, N m.
     pub deviation: Vec<f64>,
-    /// Whether a sample takes part: not where held bristles show the noise of the root's way and little else. It is the same for
-    /// every hypothesis: one that is certain of a sample would pay for it, and one that is not would not.
+    /// Whether a sample takes part: not where held bristles show the noise of the root's way and little else, nor where the tip
+    /// slips and sticks faster than samples tell. It is the same for every hypothesis: one that is certain of a sample would
+    /// pay for it, and one that is not would not.
     pub known: Vec<bool>,
     /// n² of each source for each sample.
     sources: Vec<[f64; SOURCES]>,
@@ -58,6 +64,8 @@ pub struct Noise {
     /// Variance of what is uncertain of the force itself, which strikes the sensor's mode: that of the named sources, since one
     /// taken from residuals would grow with what nothing explains.
     pub(super) of_force: Vec<f64>,
+    /// Share of the channel's own noise in each sample's variance.
+    of_channel: Vec<f64>,
     /// Deviations before anything is fitted, the form of the model left out.
     named: Vec<f64>,
     /// Samples that count as one: the spectral density of the residuals below 30 Hz over their variance.
@@ -74,7 +82,7 @@ impl Noise {
     /// Before anything is fitted.
     pub fn new(logs: &[ContactLog], contact: &Contact, prediction: &Prediction) -> Self {
         let (curve, stiffness_n_per_m) = (&contact.curve, contact.stiffness_n_per_m);
-        let mut sources = Vec::new();
+        let (mut sources, mut resolved) = (Vec::new(), Vec::new());
         let mut from = 0;
         for (log, observed) in logs.iter().zip(&prediction.observed) {
             let shown = &prediction.shown_nm[from..from + log.len()];
@@ -87,10 +95,10 @@ impl Noise {
             let predicted: Vec<f64> =
                 predicted.iter().zip(&wide_change).map(|(p, m)| p.min(3.0 * m + floor)).collect();
             let wide_predicted = local_maximum(&predicted, 6);
+            let slides: Vec<bool> = observed.sliding.iter().map(|s| *s > 0.5).collect();
+            resolved.extend(cycles_resolved(&slides, log.grid.interval_s() / log.grid.step_s));
             let transition = local_maximum(
-                &magnitude(gradient(
-                    &observed.sliding.iter().map(|s| f64::from(u8::from(*s > 0.5))).collect::<Vec<f64>>(),
-                )),
+                &magnitude(gradient(&slides.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<f64>>())),
                 4,
             );
             let slip_noise =
@@ -124,7 +132,7 @@ impl Noise {
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
         let certainties = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
-        let known = certainties.map(|c| *c > LEAST_CERTAINTY).collect();
+        let known = certainties.zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
         let mut noise = Self {
             sources,
             of_force,
@@ -137,6 +145,8 @@ impl Noise {
         let mut factors = [1.0; SOURCES];
         factors[MODEL_FORM_SOURCE] = 0.0;
         noise.weigh(logs, &factors);
+        // The model's form is no error from sample to sample; how large it is the residuals tell.
+        noise.share_channel(&factors);
         noise.named = std::mem::take(&mut noise.deviation);
         if contact.bristles_alone {
             // It is in the residuals' scale, with the stiffness of each point.
@@ -188,6 +198,11 @@ impl Noise {
         self.repeated = (samples / self.temper).max(1.0);
     }
 
+    /// What residuals have to be multiplied with where of the channel's noise only these shares of its variance are left.
+    pub fn scales<'n>(&'n self, left: impl Iterator<Item = f64> + 'n) -> impl Iterator<Item = f64> + 'n {
+        self.of_channel.iter().zip(left).map(|(share, left)| (1.0 + share * (left - 1.0)).sqrt().recip())
+    }
+
     /// Measured less predicted, without what the channel was seen to swing with; all logs on end, N m.
     pub fn innovations(&self, mut residual: Vec<f64>) -> Vec<f64> {
         let mut from = 0;
@@ -199,6 +214,12 @@ impl Noise {
             }
         }
         residual
+    }
+
+    fn share_channel(&mut self, factors: &[f64; SOURCES]) {
+        let own = |n: &[f64; SOURCES]| OF_CHANNEL.map(|s| factors[s] * n[s]).sum::<f64>();
+        let all = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
+        self.of_channel = self.sources.iter().map(|n| own(n) / all(n)).collect();
     }
 
     /// Fits the sources' factors to residuals (over the present deviations) and takes the effective sample size from
@@ -245,6 +266,7 @@ impl Noise {
         self.sensor_factor = factors[0];
         let before = std::mem::take(&mut self.deviation);
         self.weigh(logs, &factors);
+        self.share_channel(&factors);
         // Influence of each residual on a slow parameter.
         let pull: Vec<f64> = r
             .iter()
@@ -272,6 +294,24 @@ impl Noise {
     }
 }
 
+/// Where cycles of slip and stick are long enough to be told from samples so many points apart. Faster ones are seen through what
+/// smooths the channel, and friction at a slip that is smoothed is wrong by the same in each of them.
+fn cycles_resolved(slides: &[bool], samples: f64) -> Vec<bool> {
+    // Over two such cycles, or a single breakaway that hesitates would count.
+    let reach = (SAMPLES_PER_CYCLE * samples).round() as usize;
+    let mut changes = vec![0usize];
+    changes.extend(slides.windows(2).scan(0, |sum, pair| {
+        *sum += usize::from(pair[0] != pair[1]);
+        Some(*sum)
+    }));
+    let last = slides.len().saturating_sub(1);
+    let fast: Vec<f64> = (0..slides.len())
+        .map(|i| changes[(i + reach).min(last)] - changes[i.saturating_sub(reach)])
+        .map(|near| f64::from(u8::from(near > 4)))
+        .collect();
+    local_maximum(&fast, reach).into_iter().map(|fast| fast == 0.0).collect()
+}
+
 /// Mean spectral density below [`SLOW_HZ`] over that of all frequencies: from the variance of means over blocks of half a
 /// period of that frequency, which is its spectral window.
 pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
@@ -288,6 +328,23 @@ pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slip_and_stick_that_change_within_few_samples_are_not_resolved() {
+        // Cycles of 6 samples, then of 30; a breakaway that hesitates before them.
+        let slides = |i: usize| match i {
+            0..200 => i == 100 || i == 102,
+            200..600 => i % 6 < 3,
+            _ => i % 30 < 10,
+        };
+        let slides: Vec<bool> = (0..1200).map(slides).collect();
+        let resolved = cycles_resolved(&slides, 1.0);
+        assert!(resolved[..170].iter().all(|resolved| *resolved));
+        assert!(resolved[200..600].iter().all(|resolved| !resolved));
+        assert!(resolved[640..].iter().all(|resolved| *resolved));
+        // Points between samples five times as far apart: cycles of six samples each.
+        assert!(cycles_resolved(&slides, 5.0)[700..1100].iter().all(|resolved| !resolved));
+    }
 
     #[test]
     fn samples_that_swing_count_as_the_few_that_their_scores_tell() {

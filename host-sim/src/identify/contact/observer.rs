@@ -11,9 +11,15 @@
 //! force's size and sign. Bristles without a block need none of this (`bristles.rs`).
 //!
 //! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
+//!
+//! The measured force stands on both sides. Its noise n moves the slip by −n∗h/c and the law by γ n∗h, γ = −F_N g′/c, so that a
+//! right law leaves n − γ n∗h: the less, the nearer γ is to one, whatever the force really does. The residual is therefore
+//! taken over the deviation of that ([`Observed::own_noise`]), or damping would be drawn towards F_N |g′|.
 //! Left out: what the force did between samples; slip that begins and ends within one.
 
 use super::law::Contact;
+use super::log::OBSERVED_OVER;
+use crate::identify::filters::smoothed_flat;
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Slip is faster than so many deviations of its noise.
@@ -65,6 +71,8 @@ pub struct Observed {
     /// of the root's way comes through their stiffness. A stiffness of which that leaves nothing to see has no weight there.
     /// 1 with a block, which is some hundred times softer.
     pub certainty: Vec<f64>,
+    /// Share of the variance of the channel's noise that a right law leaves, since it stands in the prediction too.
+    pub own_noise: Vec<f64>,
 }
 
 impl Observed {
@@ -76,6 +84,7 @@ impl Observed {
             slip_m_s: zeros.clone(),
             sliding: zeros,
             certainty: vec![1.0; samples],
+            own_noise: vec![1.0; samples],
         }
     }
 }
@@ -169,6 +178,41 @@ impl Block {
     }
 }
 
+/// What the channel's noise does to the slip: the block's rate times its damping, behind the smoothing, for a unit of noise in
+/// one sample.
+struct OwnNoise {
+    /// The response to the sample's own noise.
+    own: f64,
+    /// Sum of its squares over all samples.
+    squares: f64,
+}
+
+impl OwnNoise {
+    fn new(block: &Block, contact: &Contact, step_s: f64) -> Self {
+        const SAMPLES: usize = 256;
+        const AT: usize = SAMPLES / 4;
+        let mut impulse = vec![0.0; SAMPLES];
+        impulse[AT] = 1.0;
+        let force = smoothed_flat(&impulse, OBSERVED_OVER);
+        let mut state = SVector::<f64, 4>::zeros();
+        let block_m: Vec<f64> = (0..SAMPLES)
+            .map(|i| {
+                if i > 0 {
+                    block.step(&mut state, &force, i);
+                }
+                state[0]
+            })
+            .collect();
+        let rate = |i: usize| contact.damping_n_s_per_m * (block_m[i + 1] - block_m[i - 1]) / (2.0 * step_s);
+        Self { own: rate(AT), squares: (1..SAMPLES - 1).map(|i| rate(i).powi(2)).sum() }
+    }
+
+    /// Variance of n − γ n∗h over that of n.
+    fn left(&self, gamma: f64) -> f64 {
+        1.0 - 2.0 * gamma * self.own + gamma * gamma * self.squares
+    }
+}
+
 /// Kalman gain of a random walk of variance `motion`² a step seen with the deviation `force` (both N).
 fn stick_gain(motion: f64, force: f64) -> f64 {
     let ratio = (motion / force.max(1e-12)).powi(2);
@@ -212,6 +256,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut held = start;
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
+    // Between samples that are far apart the force is not noise but a guess.
+    let own_noise = (drive.interval_s <= dt && c > 0.0).then(|| OwnNoise::new(&block, contact, dt));
     out.force_n[0] = force[0];
     for i in 1..n {
         let (observed, slipped) = (next, slips_next);
@@ -245,6 +291,10 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         };
         out.sliding[i] = slips;
 
+        if let (Some(own), true) = (&own_noise, slips > NEGLIGIBLE) {
+            let slope = loaded * contact.curve.derivative(speed) + per_load * load + film;
+            out.own_noise[i] += slips * (own.left(-slope / c) - 1.0);
+        }
         let sliding = if slips > NEGLIGIBLE {
             sign * (loaded * contact.curve.at(speed) + (per_load * load + film) * speed)
         } else {
@@ -297,20 +347,69 @@ mod tests {
     use crate::identify::contact::law::Curve;
     use crate::identify::noise::White;
 
-    /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
-    #[test]
-    fn slip_is_seen_between_samples_that_are_far_apart() {
-        const STEP_S: f64 = 1e-3;
-        let contact = Contact {
-            curve: Curve::new(|_| 0.5),
-            stiffness_n_per_m: 2e4,
-            damping_n_s_per_m: 0.0,
+    fn block(stiffness_n_per_m: f64, damping_n_s_per_m: f64, curve: Curve) -> Contact {
+        Contact {
+            curve,
+            stiffness_n_per_m,
+            damping_n_s_per_m,
             bristles_n_per_m: f64::INFINITY,
             bristles_alone: false,
             branches: [(0.0, 1.0); 3],
             viscous: (0.0, 0.0),
             ageing: None,
+        }
+    }
+
+    /// Steady sliding on a falling curve, the force measured with white noise: what a right law leaves, over its stated
+    /// deviation, is as large as the noise for every damping that the law may have, so that noise does not choose one.
+    #[test]
+    fn noise_that_stands_on_both_sides_does_not_choose_the_damping() {
+        const STEP_S: f64 = 1e-3;
+        const NOISE_N: f64 = 0.2;
+        let n = 20_000;
+        let (load, speed) = (80.0, 0.06);
+        let mut noise = White::new(3);
+        let root_m: Vec<f64> = (0..n).map(|i| speed * STEP_S * i as f64).collect();
+        let (loads, slope) = (vec![load; n], 1.2);
+        let force_n: Vec<f64> = (0..n).map(|_| load * 0.6 + NOISE_N * noise.next()).collect();
+        let smooth = smoothed_flat(&force_n, OBSERVED_OVER);
+        let left = |damping: f64, stated: bool| {
+            let contact = block(25_000.0, damping, Curve::new(|w| (0.6 - slope * (w - speed)).max(0.1)));
+            let drive = Drive {
+                step_s: STEP_S,
+                interval_s: STEP_S,
+                root_m: &root_m,
+                load_n: &loads,
+                force_n: &smooth,
+                factor: None,
+                slip_threshold_m_s: 1e-3,
+                noise: (1e-6, NOISE_N),
+            };
+            let seen = observe(&contact, &drive);
+            let of = |i: usize| {
+                let variance = if stated { seen.own_noise[i] } else { 1.0 };
+                (force_n[i] - seen.force_n[i]).powi(2) / variance
+            };
+            ((500..n - 500).map(of).sum::<f64>() / (n - 1000) as f64).sqrt() / NOISE_N
         };
+        // F_N |g′| is 96 N s/m.
+        for damping in [96.0, 150.0, 300.0] {
+            assert!((left(damping, true) - 1.0).abs() < 0.03, "{damping}: {}", left(damping, true));
+        }
+        // As it is, the one at which the slope's force cancels the damper's would leave least.
+        assert!(
+            left(96.0, false) < left(300.0, false) - 0.05,
+            "{} {}",
+            left(96.0, false),
+            left(300.0, false)
+        );
+    }
+
+    /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
+    #[test]
+    fn slip_is_seen_between_samples_that_are_far_apart() {
+        const STEP_S: f64 = 1e-3;
+        let contact = block(2e4, 0.0, Curve::new(|_| 0.5));
         let mut noise = White::new(1);
         let samples: Vec<f64> = (0..102).map(|_| 5.0 + 0.15 * noise.next()).collect();
         let force_n: Vec<f64> = (0..1000)

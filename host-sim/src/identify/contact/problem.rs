@@ -28,7 +28,7 @@ const BOUND: f64 = 3.0;
 /// Slip is faster than this share of the root's usual speed.
 const SLOWEST_SLIP: f64 = 0.015;
 /// Drift of the root against the measured motion, relative to its usual speed: what the elements' way differs by.
-const DRIFT: f64 = 5e-4;
+pub const DRIFT: f64 = 5e-4;
 /// A sample is well known where its deviation is less than this share of the usual torque.
 const WELL_KNOWN: f64 = 0.1;
 /// A step that gains less −ln posterior than this moves no value by more than a seventh of its deviation; so many at most.
@@ -304,7 +304,9 @@ impl<'a> Problem<'a> {
     fn scaled(&self, prediction: &Prediction) -> Vec<f64> {
         let usable = self.logs.iter().flat_map(|log| log.usable.iter()).zip(&self.noise.known);
         let certainty = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
-        let left = self.measured().zip(&prediction.shown_nm).zip(certainty).map(|((y, x), c)| c * (y - x));
+        let own_noise = prediction.observed.iter().flat_map(|observed| observed.own_noise.iter().copied());
+        let scales = certainty.zip(self.noise.scales(own_noise)).map(|(certainty, scale)| certainty * scale);
+        let left = self.measured().zip(&prediction.shown_nm).zip(scales).map(|((y, x), c)| c * (y - x));
         let mut left: Vec<f64> = left.collect();
         if let Some(mode) = prediction.ringing {
             self.behind_mode(&mut left, mode);
