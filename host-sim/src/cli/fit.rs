@@ -355,6 +355,9 @@ fn write_contact(
         100.0 * nrmse,
         100.0 * fit.nrmse_by_observed_slip
     ));
+    if let Some(left_out) = &fit.left_out {
+        say(left_out);
+    }
     if fit.simulated {
         say(
             "a simulation of these logs leaves less than the observed slip does: the numbers are those of the simulation",

@@ -72,6 +72,8 @@ pub struct ContactFit {
     pub starts_agreeing: usize,
     /// Whether the simulation decided in the end, since it left less than the observed slip.
     pub simulated: bool,
+    /// What was left out of the logs, in a sentence.
+    pub left_out: Option<String>,
     /// RMS error over RMS of the friction torque, by the observed slip, over all logs.
     pub nrmse_by_observed_slip: f64,
 }
@@ -272,6 +274,7 @@ pub fn identify(
         on_bound,
         starts_agreeing,
         simulated: by_simulation,
+        left_out: problem.noise.unresolved(),
         nrmse_by_observed_slip: (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt(),
     })
 }

@@ -1,8 +1,8 @@
 //! The contact simulated from motion and load alone: what `rig fit` ends with where such a simulation follows the rig.
 //!
 //! The observed slip finds the valley, but between samples of a millisecond it knows the force only by interpolation: a step of the
-//! load that rings at 120 Hz is then wrong by a tenth, and what such steps alone tell, the block's damping, is drawn
-//! towards F_N |g′|. A simulation goes between the samples, and a rig that slides steadily keeps it on its course. One that
+//! load that rings at 120 Hz is then wrong by a tenth, and so is what such steps alone tell, the block's damping. A
+//! simulation goes between the samples, and a rig that slides steadily keeps it on its course. One that
 //! sticks and slips does not: there the simulation slips at other instants, leaves more than the observed slip does, and is
 //! not used.
 //!

@@ -440,6 +440,7 @@ pub fn judge(
             ));
         }
     }
+    notes.extend(contact.as_ref().and_then(|contact| contact.noise.unresolved()));
     if contact.as_ref().is_some_and(rest::nothing_is_known) {
         notes.push(
             "no sample of the friction torque is known to a tenth of its usual size: nothing can be said of the friction"

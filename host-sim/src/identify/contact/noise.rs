@@ -57,6 +57,9 @@ pub struct Noise {
     /// slips and sticks faster than samples tell. It is the same for every hypothesis: one that is certain of a sample would
     /// pay for it, and one that is not would not.
     pub known: Vec<bool>,
+    /// Time in which slip and stick change faster than samples tell, in all logs together, and the time in which they are used
+    /// but for that, s.
+    unresolved_s: (f64, f64),
     /// n² of each source for each sample.
     sources: Vec<[f64; SOURCES]>,
     /// The filter of what swings in each log with the present deviations, and the log's length.
@@ -132,11 +135,18 @@ impl Noise {
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
         let certainties = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
+        let times = logs
+            .iter()
+            .flat_map(|log| log.usable.iter().map(|used| f64::from(u8::from(*used)) * log.grid.step_s));
+        let unresolved_s = times.zip(&resolved).fold((0.0, 0.0), |(out, all), (step_s, resolved)| {
+            (out + if *resolved { 0.0 } else { step_s }, all + step_s)
+        });
         let known = certainties.zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
         let mut noise = Self {
             sources,
             of_force,
             known,
+            unresolved_s,
             temper: 3.0 / density,
             repeated: 1.0,
             sensor_factor: 1.0,
@@ -154,6 +164,17 @@ impl Noise {
         }
         noise.weigh(logs, &[1.0; SOURCES]);
         noise
+    }
+
+    /// What is left out since slip and stick change within few samples, in a sentence; `None` where nothing is.
+    pub fn unresolved(&self) -> Option<String> {
+        let (out_s, all_s) = self.unresolved_s;
+        (out_s > 0.0).then(|| {
+            format!(
+                "{out_s:.1} s of {all_s:.1} s are left out: the tip slips and sticks there within fewer than {SAMPLES_PER_CYCLE} \
+                 samples; log at a higher rate to see it"
+            )
+        })
     }
 
     /// Deviation of a sample from its named sources before anything is fitted, the form of the model left out: what noise
