@@ -227,8 +227,7 @@ pub fn identify(
     });
     let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
     let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
-    let known_to = (smoothing_s, DRIFT * usual_m_s);
-    let points = points(&baseline, &fit.p, &of_p, slid.collect(), known_to);
+    let points = points(&baseline, &fit.p, &of_p, slid.collect(), smoothing_s, DRIFT * usual_m_s);
     let values = values(model, &baseline, &fit.p, free);
     let uncertain = match &points {
         Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),

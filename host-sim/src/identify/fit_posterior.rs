@@ -104,7 +104,8 @@ pub(super) fn points(
     p: &[f64],
     covariance: &DMatrix<f64>,
     slid_m_s: Vec<f64>,
-    (smoothing_s, slip_error_m_s): (f64, f64),
+    smoothing_s: f64,
+    slip_error_m_s: f64,
 ) -> Option<Vec<Vec<f64>>> {
     let n = p.len();
     let count = baseline.free.iter().filter(|base| Seen::is_curve(base.role)).count();
@@ -219,7 +220,7 @@ mod tests {
         };
         let of = |deviation: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
-            let points = points(&baseline, &p, &covariance, slid(), (0.0, 0.0)).unwrap();
+            let points = points(&baseline, &p, &covariance, slid(), 0.0, 0.0).unwrap();
             let mut v0: Vec<f64> = points.iter().map(|q| q[2] - p[2]).collect();
             (quantile(&mut v0, 0.025), quantile(&mut v0, 0.975))
         };

@@ -113,6 +113,7 @@ mod tests {
         Drive {
             step_s: STEP_S,
             interval_s: STEP_S,
+            dense: true,
             root_m,
             load_n,
             force_n,

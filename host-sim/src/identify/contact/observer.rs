@@ -44,6 +44,8 @@ pub struct Drive<'a> {
     pub step_s: f64,
     /// Time between samples of the log, s: what lies between them is not measured.
     pub interval_s: f64,
+    /// Whether samples are about as close as the points ([`crate::identify::grid::Grid::is_dense`]).
+    pub dense: bool,
     /// Way of the root, m.
     pub root_m: &'a [f64],
     /// Normal force, N.
@@ -189,6 +191,7 @@ struct OwnNoise {
 
 impl OwnNoise {
     fn new(block: &Block, contact: &Contact, step_s: f64) -> Self {
+        // A block that follows within 50 samples has come to rest behind the impulse.
         const SAMPLES: usize = 256;
         const AT: usize = SAMPLES / 4;
         let mut impulse = vec![0.0; SAMPLES];
@@ -257,7 +260,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     // Between samples that are far apart the force is not noise but a guess.
-    let own_noise = (drive.interval_s <= dt && c > 0.0).then(|| OwnNoise::new(&block, contact, dt));
+    let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt));
     out.force_n[0] = force[0];
     for i in 1..n {
         let (observed, slipped) = (next, slips_next);
@@ -373,11 +376,13 @@ mod tests {
         let (loads, slope) = (vec![load; n], 1.2);
         let force_n: Vec<f64> = (0..n).map(|_| load * 0.6 + NOISE_N * noise.next()).collect();
         let smooth = smoothed_flat(&force_n, OBSERVED_OVER);
+        // As with a sample missing now and then: the points are hardly closer than the samples.
         let left = |damping: f64, stated: bool| {
             let contact = block(25_000.0, damping, Curve::new(|w| (0.6 - slope * (w - speed)).max(0.1)));
             let drive = Drive {
                 step_s: STEP_S,
-                interval_s: STEP_S,
+                interval_s: 1.003 * STEP_S,
+                dense: true,
                 root_m: &root_m,
                 load_n: &loads,
                 force_n: &smooth,
@@ -420,6 +425,7 @@ mod tests {
             let drive = Drive {
                 step_s: STEP_S,
                 interval_s,
+                dense: interval_s < 2.0 * STEP_S,
                 root_m: &root_m,
                 load_n: &[10.0; 1000],
                 force_n: &force_n,

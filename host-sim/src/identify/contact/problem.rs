@@ -273,6 +273,7 @@ impl<'a> Problem<'a> {
             let drive = Drive {
                 step_s: log.grid.step_s,
                 interval_s: log.grid.interval_s(),
+                dense: log.grid.is_dense(),
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
                 load_n: &log.load_n,
                 force_n: &[],
