@@ -98,6 +98,8 @@ struct ContactSummary {
     nrmse_by_observed_slip: f64,
     /// Whether a simulation decided in the end, since it left less than the observed slip.
     fitted_by_simulation: bool,
+    /// What the observed slip was biased by in logs of this kind and was taken off, relative to the value.
+    bias_removed: BTreeMap<String, f64>,
     /// Parameters that these logs do not determine within a factor of e; they have no interval.
     undetermined: Vec<String>,
     /// How much later than the rig file says the friction channel is, found beside the parameters.
@@ -363,11 +365,16 @@ fn write_contact(
             "a simulation of these logs leaves less than the observed slip does: the numbers are those of the simulation",
         );
     }
+    let most = names.iter().zip(&fit.bias).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    if let (Some((name, bias)), false) = (most, fit.simulated) {
+        say(&format!("bias of the observed slip, taken off: at most {:.1} %, of {name}", 100.0 * bias));
+    }
     let summary = ContactSummary {
         kind: fit.model.kind.name(),
         fit: found,
         nrmse_by_observed_slip: fit.nrmse_by_observed_slip,
         fitted_by_simulation: fit.simulated,
+        bias_removed: fit.names.iter().cloned().zip(fit.bias.iter().copied()).collect(),
         undetermined,
         channel_late_ms: fit.late_ms,
         singular_ratio: fit.singular_ratio,

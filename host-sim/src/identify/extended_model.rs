@@ -131,9 +131,8 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
 }
 
 impl ExtendedContact {
-    /// What turned out to be a model of another kind, without an effect around it, is fitted as `rig fit` does: its simulation
-    /// goes between the samples, where the observed slip draws a block's damping towards F_N |g′|. Where that fit refuses, the
-    /// numbers stand as they were found.
+    /// What turned out to be a model of another kind, without an effect around it, is fitted as `rig fit` does: the
+    /// observer's bias is taken off its numbers. Where that fit refuses, they stand as they were found.
     pub fn fitted(self, told: &ModelFile, rig: &RigFile, logs: &[Log], progress: &(dyn Fn() + Sync)) -> Self {
         if self.model.kind == told.kind || !self.model.extensions.is_empty() {
             return self;

@@ -3,18 +3,20 @@
 //! The friction law is evaluated at the slip that is observed from the measured force
 //! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
 //! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it;
-//! then the noise's sources are fitted to what is left, and the parameters again. Where a simulation from there leaves less
-//! than the observed slip, it decides in the end (`fit_simulated`).
+//! then the noise's sources are fitted to what is left, and the parameters again. What the observer is biased by in logs of
+//! this kind, known numbers simulated, is taken off (`fit_bias`). Where a simulation from there leaves less than the observed
+//! slip, it decides in the end (`fit_simulated`).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contact::log::{ContactLog, OBSERVED_OVER};
 use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
 use super::filters::rms;
+use super::fit_bias::Resimulated;
 use super::fit_interval::covariance;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
-use super::fit_posterior::{points, quantile, spread};
+use super::fit_profile::{Known, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
@@ -70,7 +72,9 @@ pub struct ContactFit {
     pub on_bound: Vec<String>,
     /// Starts that ended at the same optimum.
     pub starts_agreeing: usize,
-    /// Whether the simulation decided in the end, since it left less than the observed slip.
+    /// What the observer was biased by in logs of this kind, relative to each value: taken off.
+    pub bias: Vec<f64>,
+    /// Whether a simulation of the logs decided in the end, since it left less than the observed slip.
     pub simulated: bool,
     /// What was left out of the logs, in a sentence.
     pub left_out: Option<String>,
@@ -201,19 +205,20 @@ pub fn identify(
     let singular_ratio = examined(&problem, &fit.p).map_err(refuse)?;
 
     let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
-    let prediction = problem.predict(&[], &fit.p);
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let columns = problem.jacobian(&[], &fit.p, &fit.r);
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
-    let left: Vec<f64> = problem.measured().zip(&prediction.shown_nm).map(|(y, x)| y - x).collect();
-    let left = smoothed_rms(&left, logs[0].grid.step_s);
     let mut of_p = covariance(&columns, &fit.r, &lengths, &alone);
     let mut under_prior = covariance(&columns, &fit.r, &lengths, &prior_sd);
+    let mut found = fit.p.clone();
+    fit.p = Resimulated { model, rig, baseline: &baseline, free, raw }.unbiased(&problem, &fit, progress)?;
+    let left = problem.measured().zip(problem.predict(&[], &fit.p).shown_nm).map(|(y, x)| y - x);
+    let left = smoothed_rms(&left.collect::<Vec<_>>(), logs[0].grid.step_s);
     let simulated = Simulated::new(model, rig, &baseline, free, raw, (&fit.p, left))?.fit(&fit.p, progress);
     let simulated = simulated.and_then(|fit| Some((sandwich(&fit.jacobian, &fit.residual_nm)?, fit.p)));
     let by_simulation = simulated.is_some();
     if let Some((covariance, p)) = simulated {
-        fit.p = p;
+        (fit.p, found) = (p.clone(), p);
         (of_p, under_prior) = (covariance.clone(), covariance);
     }
     let prediction = problem.predict(&[], &fit.p);
@@ -225,12 +230,16 @@ pub fn identify(
             .map(|(w, _)| w.abs())
             .filter(|w| *w > 0.0)
     });
-    let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
     let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
-    let points = points(&baseline, &fit.p, &of_p, slid.collect(), smoothing_s, DRIFT * usual_m_s);
+    let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
+    let known_to = (smoothing_s, DRIFT * usual_m_s);
+    let logs_of = |p: &[f64]| DVector::from_vec(values(model, &baseline, p, free)).map(f64::ln);
+    let known = profiles(&baseline, (&fit.p, &found), &of_p, slid.collect(), known_to, logs_of);
+    let before = values(model, &baseline, &found, free);
     let values = values(model, &baseline, &fit.p, free);
-    let uncertain = match &points {
-        Some(points) => Uncertain::of_points(model, &baseline, free, &values, points),
+    let bias = before.iter().zip(&values).map(|(before, value)| before / value - 1.0).collect();
+    let uncertain = match known {
+        Some(known) => Uncertain::of_profiles(&values, &known),
         None => {
             let to_log = log_derivatives(model, &baseline, &fit.p, free);
             Uncertain::about(&values, &(&to_log * under_prior * to_log.transpose()))
@@ -272,6 +281,7 @@ pub fn identify(
         singular_ratio,
         on_bound,
         starts_agreeing,
+        bias,
         simulated: by_simulation,
         left_out: problem.noise.unresolved(),
         nrmse_by_observed_slip: (error / f64::max(signal, f64::MIN_POSITIVE)).sqrt(),
@@ -305,30 +315,16 @@ impl Uncertain {
         }
     }
 
-    /// From points of the posterior.
-    fn of_points(
-        model: &ModelFile,
-        baseline: &Baseline,
-        free: &[String],
-        values: &[f64],
-        points: &[Vec<f64>],
-    ) -> Self {
-        let logs: Vec<Vec<f64>> = points
-            .iter()
-            .map(|p| self::values(model, baseline, p, free).into_iter().map(f64::ln).collect())
-            .collect();
-        let of_log = spread(&logs);
-        let (mut std, mut ends) = (Vec::new(), Vec::new());
-        for (i, value) in values.iter().enumerate() {
-            let mut own: Vec<f64> = logs.iter().map(|x| x[i]).collect();
-            // Quantiles of the normal's 95 %, widened as Student's t asks for the blocks' count.
-            let widened = |x: f64| value.ln() + (x - value.ln()) * INTERVAL_95 / 1.96;
-            let low = widened(quantile(&mut own, 0.025)).exp().min(*value);
-            let high = widened(quantile(&mut own, 0.975)).exp().max(*value);
-            std.push(value * of_log[(i, i)].sqrt());
-            ends.push(determined(low, high));
+    /// From profiles of the posterior.
+    fn of_profiles(values: &[f64], known: &Known) -> Self {
+        let ends = || known.ends.iter().zip(values);
+        Self {
+            std: ends().map(|((low, high), value)| value * (high - low) / (2.0 * INTERVAL_95)).collect(),
+            ends: ends()
+                .map(|((low, high), value)| determined(low.exp().min(*value), high.exp().max(*value)))
+                .collect(),
+            correlations: correlations(&known.local),
         }
-        Self { std, ends, correlations: correlations(&of_log) }
     }
 }
 
@@ -388,7 +384,8 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "k_u comes out 5 % high, three deviations: noise of the force while the tip sticks"]
+    #[ignore = "c_u comes out 4 % high, two and a half deviations: over ten pairs of such logs its mean is 161 for 160, but it \
+                scatters by twice what is stated where the speed column is all that tells the motion"]
     fn a_series_element_is_found_from_a_start_that_is_off_by_a_third() {
         let numbers = |k: f64, c: f64, a0: f64, a1: f64, v0: f64| {
             model(
@@ -416,6 +413,29 @@ mod tests {
             assert!(interval.std < most * value, "{name}: {interval:?}");
         }
         assert!(fit.nrmse_by_observed_slip < 0.02, "{}", fit.nrmse_by_observed_slip);
+    }
+
+    /// A block that follows within one and a half samples: smoothing and interpolation of the force tell of another one.
+    #[test]
+    fn what_the_observer_is_biased_by_is_taken_off() {
+        let numbers = [
+            ("sigma0_n_per_m", 1.5e7),
+            ("k_u_n_per_m", 4e4),
+            ("c_u_n_s_per_m", 60.0),
+            ("a0", 0.5),
+            ("a1", 0.2),
+            ("v0_m_s", 0.4),
+        ];
+        let truth = model(ModelKind::Series, &numbers);
+        let fit = fitted(&truth, &truth, true).unwrap();
+        for (name, interval) in &fit.model.intervals {
+            let value = truth.get(name).unwrap();
+            assert!(interval.low < value && value < interval.high, "{name}: {interval:?}");
+        }
+        let at = fit.names.iter().position(|name| name == "k_u_n_per_m").unwrap();
+        let off = |value: f64| (value / 4e4 - 1.0).abs();
+        let (before, after) = (off(fit.values[at] * (1.0 + fit.bias[at])), off(fit.values[at]));
+        assert!(before > 0.005 && after < 0.5 * before, "{before} {after}");
     }
 
     #[test]

@@ -48,7 +48,15 @@ impl Piece {
 
 /// The signal at t + `ahead_s` for each t; its first and last value outside the log.
 pub fn shifted(time_s: &[f64], values: &[f64], ahead_s: f64) -> Vec<f64> {
-    let (Some(last), true) = (time_s.len().checked_sub(1), ahead_s != 0.0) else { return values.to_vec() };
+    if ahead_s == 0.0 {
+        return values.to_vec();
+    }
+    resampled(time_s, values, time_s.iter().map(|t| t + ahead_s))
+}
+
+/// The signal at other times, which rise; its first and last value outside the log.
+pub fn resampled(time_s: &[f64], values: &[f64], at_s: impl Iterator<Item = f64>) -> Vec<f64> {
+    let Some(last) = time_s.len().checked_sub(1) else { return Vec::new() };
     let curve = Curve::new(time_s, values);
     let mut i = 0;
     let at = |t: f64| {
@@ -60,7 +68,7 @@ pub fn shifted(time_s: &[f64], values: &[f64], ahead_s: f64) -> Vec<f64> {
         }
         curve.piece(i).at((t - time_s[i]) / (time_s[i + 1] - time_s[i]))
     };
-    time_s.iter().map(|t| t + ahead_s).map(at).collect()
+    at_s.map(at).collect()
 }
 
 #[cfg(test)]

@@ -83,6 +83,10 @@ fn intervals(
     *stick_slip = case.truth.stick_slip;
     let failed = |e: std::io::Error| format!("{}: {e}", here.display());
     let paths = case.write(here).map_err(failed)?;
+    if runner.keep {
+        let text = serde_json::to_string_pretty(&case.truth).map_err(|e| e.to_string())?;
+        std::fs::write(here.join("truth.json"), text).map_err(failed)?;
+    }
     let out = here.join("out");
     let mut command = runner.tool("fit");
     command.arg("--train").args(&paths.train).arg("--out").arg(&out);

@@ -77,8 +77,8 @@ pub struct Noise {
     repeated: f64,
     /// Which samples these are: the sensor's own noise is less than half of their variance.
     swinging: Vec<bool>,
-    /// The sensor's factor a, as fitted.
-    pub sensor_factor: f64,
+    /// Factors a of the sources, as fitted.
+    factors: [f64; SOURCES],
 }
 
 impl Noise {
@@ -149,7 +149,7 @@ impl Noise {
             unresolved_s,
             temper: 3.0 / density,
             repeated: 1.0,
-            sensor_factor: 1.0,
+            factors: [1.0; SOURCES],
             ..Self::default()
         };
         let mut factors = [1.0; SOURCES];
@@ -237,6 +237,16 @@ impl Noise {
         residual
     }
 
+    /// With factors and effective sample size that were fitted to other logs of the same rig.
+    #[must_use]
+    pub fn fitted_as(mut self, logs: &[ContactLog], other: &Self) -> Self {
+        self.factors = other.factors;
+        self.temper = other.temper;
+        self.weigh(logs, &other.factors);
+        self.share_channel(&other.factors);
+        self
+    }
+
     fn share_channel(&mut self, factors: &[f64; SOURCES]) {
         let own = |n: &[f64; SOURCES]| OF_CHANNEL.map(|s| factors[s] * n[s]).sum::<f64>();
         let all = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
@@ -284,7 +294,7 @@ impl Noise {
             factors = std::array::from_fn(|s| found[s].max(1e-3));
             factors[0] = factors[0].max(0.2);
         }
-        self.sensor_factor = factors[0];
+        self.factors = factors;
         let before = std::mem::take(&mut self.deviation);
         self.weigh(logs, &factors);
         self.share_channel(&factors);

@@ -1,0 +1,151 @@
+//! What the observed slip makes of logs whose numbers are known, and the bias that it shows of itself.
+//!
+//! The observer knows force and load only at the samples: it interpolates what rings between them, sees a slip that begins or
+//! ends within one late, and smooths what it differentiates. Each of these moves the numbers that fit best, by the same in
+//! every log of the kind. So the fitted contact is simulated with the logs' own motion and load, noise is put on all channels,
+//! and the same likelihood is asked which numbers it would take: p̂ = p + b(p), solved for p by Broyden's method (indirect
+//! inference, Gouriéroux, Monfort and Renault 1993). No instant of slip has to be that of the rig. b is the mean over noise
+//! and the same noise with the other sign, so that what it does in first order cancels and what it biases stays.
+//! Left out: what differs between the rig and the model.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::contact::log::ContactLog;
+use super::contact::problem::{Baseline, Fit, Problem, Role};
+use super::fit_parameters::{set_all, values};
+use super::linear::{factor, normal_equations};
+use super::noise::{White, standard_deviation};
+use crate::files::log::Log;
+use crate::files::model_file::ModelFile;
+use crate::files::rig_file::RigFile;
+use crate::files::signal::Signal;
+use crate::input_error::InputError;
+use crate::predict::curve::{resampled, shifted};
+use crate::predict::{BridgeModel, ContactInputs, integral, simulate_friction};
+
+/// Simulations at most.
+const ROUNDS: usize = 6;
+/// Gauss–Newton steps in a simulated log, from the numbers it was simulated with.
+const STEPS: usize = 12;
+/// A change of the numbers that is less than this share of a deviation of the prior's ends the search.
+const CONVERGED: f64 = 1e-4;
+
+/// What was fitted, and to what.
+pub(super) struct Resimulated<'a> {
+    pub(super) model: &'a ModelFile,
+    pub(super) rig: &'a RigFile,
+    pub(super) baseline: &'a Baseline,
+    pub(super) free: &'a [String],
+    pub(super) raw: &'a [Log],
+}
+
+/// Channels of a log without noise, each with the noise that is to be put on.
+type Quiet = Vec<(Signal, Vec<f64>, f64)>;
+
+impl Resimulated<'_> {
+    fn quiet(&self, p: &[f64], raw: &Log, log: &ContactLog) -> Result<Quiet, InputError> {
+        let mut model = self.model.clone();
+        model.extensions.clear();
+        set_all(&mut model, self.free, &values(self.model, self.baseline, p, self.free))?;
+        let (time_s, grid) = (raw.time_s(), &log.grid);
+        let on = |values: &[f64]| resampled(&grid.time_s, values, time_s.iter().map(|t| t - grid.start_s));
+        // What noise is in the motion would excite the contact where the rig's disc does not.
+        let sliding_speed_m_s = on(&log.root_speed_m_s);
+        let speed_rad_s: Vec<f64> = sliding_speed_m_s.iter().map(|v| v / log.radius_m).collect();
+        let inputs = ContactInputs {
+            time_s: time_s.to_vec(),
+            sliding_speed_m_s,
+            disc_angle_rad: integral(time_s, &speed_rad_s),
+            normal_force_n: on(&log.load_n),
+            initial_friction_n: log.smooth_nm.first().copied().unwrap_or_default() / log.radius_m,
+        };
+        let torque_nm = simulate_friction(&model, self.rig, &inputs)?;
+        let late = self.baseline.free.iter().position(|base| base.role == Role::Late);
+        let late_s = late.map_or(0.0, |at| 1e-3 * self.baseline.bounded(p, at));
+        let behind_s = -BridgeModel::delay_s(&self.rig.normal_bridge);
+        // A mean over samples is quieter than each.
+        let of_sample = (time_s.len() as f64 / log.len().max(1) as f64).max(1.0).sqrt();
+        let of_motion = |signal: Signal, values: Vec<f64>| {
+            raw.signal(signal).map(|column| (signal, values, standard_deviation(column)))
+        };
+        let bridges = [
+            (Signal::FrictionTorque, shifted(time_s, &torque_nm, -late_s), of_sample * log.friction_noise_nm),
+            (
+                Signal::NormalForce,
+                shifted(time_s, &inputs.normal_force_n, behind_s),
+                of_sample * log.normal_noise_n,
+            ),
+        ];
+        let motion =
+            [of_motion(Signal::M2Speed, speed_rad_s), of_motion(Signal::M2Angle, inputs.disc_angle_rad)];
+        Ok(bridges.into_iter().chain(motion.into_iter().flatten()).collect())
+    }
+
+    /// How far from `p` the likelihood's optimum is in logs with these numbers.
+    fn bias(&self, measured: &Problem<'_>, p: &[f64]) -> Result<DVector<f64>, InputError> {
+        let pairs: Vec<(&Log, &ContactLog)> = self.raw.iter().zip(measured.logs).collect();
+        let quiet: Vec<Quiet> =
+            pairs.par_iter().map(|(raw, log)| self.quiet(p, raw, log)).collect::<Result<_, InputError>>()?;
+        let optimum = |sign: f64| -> Result<DVector<f64>, InputError> {
+            let mut white = White::new(1);
+            let mut logs = Vec::new();
+            for ((raw, _), quiet) in pairs.iter().zip(&quiet) {
+                let mut shown = (*raw).clone();
+                for (signal, values, noise) in quiet {
+                    let noisy = values.iter().map(|x| x + sign * noise * white.next()).collect();
+                    shown.set_signal(*signal, noisy);
+                }
+                logs.push(ContactLog::new(&shown, self.rig)?);
+            }
+            let problem = Problem::new(&logs, self.baseline, &[]);
+            let noise = problem.noise_at(&[], p).fitted_as(&logs, &measured.noise);
+            let problem = Problem::with_noise(&logs, self.baseline, &[], noise);
+            Ok(DVector::from_vec(problem.fit(&[], p.to_vec(), STEPS, None).p))
+        };
+        let (plus, minus) = rayon::join(|| optimum(1.0), || optimum(-1.0));
+        Ok(0.5 * (plus? + minus?) - DVector::from_column_slice(p))
+    }
+
+    /// The numbers in whose logs the likelihood's optimum would be at the one that was found.
+    ///
+    /// # Errors
+    /// Logs without the columns; a model that does not take the numbers.
+    pub(super) fn unbiased(
+        &self,
+        problem: &Problem<'_>,
+        found: &Fit,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Vec<f64>, InputError> {
+        let at_found = DVector::from_column_slice(&found.p);
+        let sd = DVector::from_iterator(at_found.len(), self.baseline.free.iter().map(|b| b.parameter.sd));
+        // What these logs do not determine stays: the simulated ones determine it no more, and the prior is no bias.
+        let columns = problem.jacobian(&[], &found.p, &found.r);
+        let (h, _) = normal_equations(&columns, &problem.weights(&found.r), &found.r);
+        let with_prior = &h + DMatrix::from_diagonal(&sd.map(|sd| sd.powi(-2)));
+        let determined = factor(&with_prior).solve(&h);
+        let mut p = at_found.clone();
+        let missed = |p: &DVector<f64>| -> Result<DVector<f64>, InputError> {
+            progress();
+            Ok(p + &determined * self.bias(problem, p.as_slice())? - &at_found)
+        };
+        let mut missed_by = missed(&p)?;
+        let mut best = (missed_by.norm(), p.clone());
+        let mut inverse = DMatrix::identity(p.len(), p.len());
+        for _ in 1..ROUNDS {
+            let step = -(&inverse * &missed_by);
+            p += &step;
+            let before = std::mem::replace(&mut missed_by, missed(&p)?);
+            if missed_by.norm() < best.0 {
+                best = (missed_by.norm(), p.clone());
+            }
+            let change = &inverse * (&missed_by - before);
+            let along = step.dot(&change);
+            if step.component_div(&sd).amax() < CONVERGED || along == 0.0 {
+                break;
+            }
+            inverse += (&step - &change) * (step.transpose() * &inverse) / along;
+        }
+        Ok(best.1.as_slice().to_vec())
+    }
+}
