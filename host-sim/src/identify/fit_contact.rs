@@ -4,8 +4,8 @@
 //! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
 //! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it;
 //! then the noise's sources are fitted to what is left, and the parameters again. What the observer is biased by in logs of
-//! this kind, known numbers simulated, is taken off (`fit_bias`). Where a simulation from there leaves less than the observed
-//! slip, it decides in the end (`fit_simulated`).
+//! this kind, known numbers simulated, is taken off (`fit_bias`). Where a simulation of these logs leaves less than the observed
+//! slip, it decides in place of that (`fit_simulated`).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use super::filters::rms;
 use super::fit_bias::Resimulated;
 use super::fit_interval::covariance;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
-use super::fit_profile::{Known, profiles};
+use super::fit_profile::{Form, Known, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
@@ -211,15 +211,17 @@ pub fn identify(
     let mut of_p = covariance(&columns, &fit.r, &lengths, &alone);
     let mut under_prior = covariance(&columns, &fit.r, &lengths, &prior_sd);
     let mut found = fit.p.clone();
-    fit.p = Resimulated { model, rig, baseline: &baseline, free, raw }.unbiased(&problem, &fit, progress)?;
-    let left = problem.measured().zip(problem.predict(&[], &fit.p).shown_nm).map(|(y, x)| y - x);
+    let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);
     let left = smoothed_rms(&left.collect::<Vec<_>>(), logs[0].grid.step_s);
-    let simulated = Simulated::new(model, rig, &baseline, free, raw, (&fit.p, left))?.fit(&fit.p, progress);
+    let simulated = Simulated::new(model, rig, &baseline, free, raw, (&found, left))?.fit(&found, progress);
     let simulated = simulated.and_then(|fit| Some((sandwich(&fit.jacobian, &fit.residual_nm)?, fit.p)));
     let by_simulation = simulated.is_some();
     if let Some((covariance, p)) = simulated {
         (fit.p, found) = (p.clone(), p);
         (of_p, under_prior) = (covariance.clone(), covariance);
+    } else {
+        let resimulated = Resimulated { model, rig, baseline: &baseline, free, raw };
+        fit.p = resimulated.unbiased(&problem, &fit, progress)?;
     }
     let prediction = problem.predict(&[], &fit.p);
     let slid = prediction.observed.iter().flat_map(|o| {
@@ -232,7 +234,8 @@ pub fn identify(
     });
     let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
     let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
-    let known_to = (smoothing_s, DRIFT * usual_m_s);
+    let form = if by_simulation { Form::OF_SIMULATION } else { Form::BIAS_REMOVED };
+    let known_to = (smoothing_s, DRIFT * usual_m_s, form);
     let logs_of = |p: &[f64]| DVector::from_vec(values(model, &baseline, p, free)).map(f64::ln);
     let known = profiles(&baseline, (&fit.p, &found), &of_p, slid.collect(), known_to, logs_of);
     let before = values(model, &baseline, &found, free);

@@ -18,10 +18,25 @@ use crate::least_squares::Problem;
 /// Share of the correction for the observer's bias that is not known: the simulation that tells it has not all of the rig's
 /// noise; the deviation of an even distribution between none of it and twice it, 1/√3.
 const CORRECTION_UNKNOWN: f64 = 0.58;
-/// What is left of the damping's bias then, over the square of the smoothing's width in the block's time constant c/k. A response of
-/// variance τ²
-/// behind a filter of variance σ² has that of a τ longer by ½ σ²/τ²; taking the bias off leaves a tenth of that.
-const DAMPING_FORM: f64 = 0.05;
+/// What the engine itself is wrong by, deviations in ln.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Form {
+    /// Of the curve at each of the speeds.
+    curve: f64,
+    /// Of the stiffness.
+    stiffness: f64,
+    /// Of the damping, over the square of the smoothing's width in the block's time constant c/k: a response of variance τ² behind
+    /// a filter of variance σ² has that of a τ longer by ½ σ²/τ².
+    damping: f64,
+}
+
+impl Form {
+    /// Where the bias is taken off, a tenth of the filter's worst is left of the damping; of the others the correction tells.
+    pub(super) const BIAS_REMOVED: Self = Self { curve: 0.0, stiffness: 0.0, damping: 0.05 };
+    /// Of a simulation between samples that are joined by cubics: from what is left at the true numbers of rigs without an effect
+    /// (means over bins of speed are off by 1e-4 to 4e-4 of the friction), and of the damping half of the worst.
+    pub(super) const OF_SIMULATION: Self = Self { curve: 4e-4, stiffness: 1e-3, damping: 0.25 };
+}
 /// Step of differences.
 const STEP: f64 = 1e-4;
 /// How tightly a parameter is held where its profile is asked for, over its local deviation: what is read is where it came to be.
@@ -176,7 +191,7 @@ pub(super) fn profiles(
     (p, found): (&[f64], &[f64]),
     covariance: &DMatrix<f64>,
     slid_m_s: Vec<f64>,
-    (smoothing_s, slip_error_m_s): (f64, f64),
+    (smoothing_s, slip_error_m_s, form): (f64, f64, Form),
     logs: impl Fn(&[f64]) -> DVector<f64>,
 ) -> Option<Known> {
     let n = p.len();
@@ -190,12 +205,13 @@ pub(super) fn profiles(
     }
     let mut of_seen = &g * covariance * g.transpose();
     let correction = seen.at(p) - seen.at(found);
-    let curve = seen.of_slip_error(p, slip_error_m_s).into_iter();
+    let curve = seen.of_slip_error(p, slip_error_m_s).into_iter().map(|of_slip| of_slip.hypot(form.curve));
     let numbers = baseline.numbers(p);
     let width = smoothing_s * numbers.stiffness_n_per_m / numbers.damping_n_s_per_m.max(f64::MIN_POSITIVE);
     let rest = baseline.free.iter().map(|base| base.role).filter(|role| !Seen::is_curve(*role));
     let left = curve.chain(rest.map(|role| match role {
-        Role::Damping => (DAMPING_FORM * width * width).min(1.0),
+        Role::Stiffness => form.stiffness,
+        Role::Damping => (form.damping * width * width).min(1.0),
         _ => 0.0,
     }));
     for (i, left) in left.enumerate() {
@@ -252,7 +268,9 @@ mod tests {
         let of = |deviation: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
             let logs = |q: &[f64]| DVector::from_vec(values(&model, &baseline, q, &free)).map(f64::ln);
-            let known = profiles(&baseline, (&p, &p), &covariance, slid(), (0.0, 0.0), logs).unwrap();
+            let known =
+                profiles(&baseline, (&p, &p), &covariance, slid(), (0.0, 0.0, Form::BIAS_REMOVED), logs)
+                    .unwrap();
             (known.ends[2].0 - p[2], known.ends[2].1 - p[2])
         };
         let (low, high) = of(0.02);
