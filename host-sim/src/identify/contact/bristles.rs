@@ -119,7 +119,6 @@ mod tests {
             force_n,
             factor: None,
             slip_threshold_m_s: 5e-3,
-            late: 0.0,
             noise,
         }
     }

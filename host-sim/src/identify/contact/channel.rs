@@ -64,11 +64,6 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// How late it is, samples.
-    pub(super) fn late(&self) -> f64 {
-        self.late
-    }
-
     /// The torque that acted, N m, but for what the ends of the range took.
     pub(super) fn seen_nm(&mut self) -> Vec<f64> {
         let log = self.log;

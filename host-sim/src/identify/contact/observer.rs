@@ -19,7 +19,7 @@
 
 use super::law::Contact;
 use super::log::OBSERVED_OVER;
-use crate::identify::filters::{shifted, smoothed_flat};
+use crate::identify::filters::smoothed_flat;
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Slip is faster than so many deviations of its noise.
@@ -56,8 +56,6 @@ pub struct Drive<'a> {
     pub factor: Option<&'a [f64]>,
     /// Slip speed that counts as slip, m/s.
     pub slip_threshold_m_s: f64,
-    /// How late the channel is that the force was seen by, samples: its noise is interpolated on the way there and back.
-    pub late: f64,
     /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
     pub noise: (f64, f64),
 }
@@ -192,13 +190,13 @@ struct OwnNoise {
 }
 
 impl OwnNoise {
-    fn new(block: &Block, contact: &Contact, step_s: f64, late: f64) -> Self {
+    fn new(block: &Block, contact: &Contact, step_s: f64) -> Self {
         // A block that follows within 50 samples has come to rest behind the impulse.
         const SAMPLES: usize = 256;
         const AT: usize = SAMPLES / 4;
         let mut impulse = vec![0.0; SAMPLES];
         impulse[AT] = 1.0;
-        let force = shifted(&smoothed_flat(&impulse, OBSERVED_OVER), late);
+        let force = smoothed_flat(&impulse, OBSERVED_OVER);
         let mut state = SVector::<f64, 4>::zeros();
         let block_m: Vec<f64> = (0..SAMPLES)
             .map(|i| {
@@ -209,9 +207,7 @@ impl OwnNoise {
             })
             .collect();
         let rate = |i: usize| contact.damping_n_s_per_m * (block_m[i + 1] - block_m[i - 1]) / (2.0 * step_s);
-        let rates: Vec<f64> = (1..SAMPLES - 1).map(rate).collect();
-        let shown = shifted(&rates, -late);
-        Self { own: shown[AT - 1], squares: shown.iter().map(|x| x * x).sum() }
+        Self { own: rate(AT), squares: (1..SAMPLES - 1).map(|i| rate(i).powi(2)).sum() }
     }
 
     /// Variance of n − γ n∗h over that of n.
@@ -264,7 +260,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     // Between samples that are far apart the force is not noise but a guess.
-    let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt, drive.late));
+    let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt));
     out.force_n[0] = force[0];
     for i in 1..n {
         let (observed, slipped) = (next, slips_next);
@@ -381,8 +377,7 @@ mod tests {
         let force_n: Vec<f64> = (0..n).map(|_| load * 0.6 + NOISE_N * noise.next()).collect();
         let smooth = smoothed_flat(&force_n, OBSERVED_OVER);
         // As with a sample missing now and then: the points are hardly closer than the samples.
-        let left = |damping: f64, late: f64, stated: bool| {
-            let seen_n = shifted(&smooth, late);
+        let left = |damping: f64, stated: bool| {
             let contact = block(25_000.0, damping, Curve::new(|w| (0.6 - slope * (w - speed)).max(0.1)));
             let drive = Drive {
                 step_s: STEP_S,
@@ -390,28 +385,29 @@ mod tests {
                 dense: true,
                 root_m: &root_m,
                 load_n: &loads,
-                force_n: &seen_n,
+                force_n: &smooth,
                 factor: None,
                 slip_threshold_m_s: 1e-3,
-                late,
                 noise: (1e-6, NOISE_N),
             };
             let seen = observe(&contact, &drive);
-            let shown = shifted(&seen.force_n, -late);
             let of = |i: usize| {
                 let variance = if stated { seen.own_noise[i] } else { 1.0 };
-                (force_n[i] - shown[i]).powi(2) / variance
+                (force_n[i] - seen.force_n[i]).powi(2) / variance
             };
             ((500..n - 500).map(of).sum::<f64>() / (n - 1000) as f64).sqrt() / NOISE_N
         };
-        // F_N |g′| is 96 N s/m. Between samples a channel that is late is interpolated, which smooths its noise.
-        for (damping, late) in [(96.0, 0.0), (150.0, 0.0), (300.0, 0.0), (96.0, 0.5), (150.0, 0.5)] {
-            let left = left(damping, late, true);
-            assert!((left - 1.0).abs() < 0.03, "{damping} {late}: {left}");
+        // F_N |g′| is 96 N s/m.
+        for damping in [96.0, 150.0, 300.0] {
+            assert!((left(damping, true) - 1.0).abs() < 0.03, "{damping}: {}", left(damping, true));
         }
         // As it is, the one at which the slope's force cancels the damper's would leave least.
-        let (near, far) = (left(96.0, 0.0, false), left(300.0, 0.0, false));
-        assert!(near < far - 0.05, "{near} {far}");
+        assert!(
+            left(96.0, false) < left(300.0, false) - 0.05,
+            "{} {}",
+            left(96.0, false),
+            left(300.0, false)
+        );
     }
 
     /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
@@ -435,7 +431,6 @@ mod tests {
                 force_n: &force_n,
                 factor: None,
                 slip_threshold_m_s: 1e-4,
-                late: 0.0,
                 noise: (1e-5, 0.15),
             };
             let seen = observe(&contact, &drive).sliding;

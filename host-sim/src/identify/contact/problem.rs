@@ -279,7 +279,6 @@ impl<'a> Problem<'a> {
                 force_n: &[],
                 factor: factor.as_deref(),
                 slip_threshold_m_s: (SLOWEST_SLIP * usual).max(SLIP_NOISES * log.speed_noise_m_s).max(1e-9),
-                late: channel.late(),
                 noise: (
                     log.speed_noise_m_s.max(DRIFT * usual),
                     log.friction_noise_nm.max(1e-12) / log.radius_m,
