@@ -84,7 +84,7 @@ fn intervals(
     let failed = |e: std::io::Error| format!("{}: {e}", here.display());
     let paths = case.write(here).map_err(failed)?;
     if runner.keep {
-        let text = serde_json::to_string_pretty(&case.truth).map_err(|e| e.to_string())?;
+        let text = case.truth.to_json().map_err(|e| e.to_string())?;
         std::fs::write(here.join("truth.json"), text).map_err(failed)?;
     }
     let out = here.join("out");
