@@ -73,8 +73,10 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
         out.sliding[i] = slips;
         out.certainty[i] = (channel / (variance + channel)).sqrt();
         let gain = variance / (variance + channel);
-        held_n += gain * (force[i] - shown);
-        variance *= 1.0 - gain;
+        if let Some(more) = drive.innovation_n(i, shown) {
+            held_n += gain * more;
+            variance *= 1.0 - gain;
+        }
         if let (Some(ageing), Some(age)) = (&contact.ageing, &mut age) {
             *age = ageing.renewed(*age, v.abs() * slips, dt);
         }
@@ -117,8 +119,10 @@ mod tests {
             root_m,
             load_n,
             force_n,
+            ends: None,
             factor: None,
             slip_threshold_m_s: 5e-3,
+            late: 0.0,
             noise,
         }
     }

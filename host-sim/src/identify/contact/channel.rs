@@ -64,6 +64,11 @@ impl<'a> Channel<'a> {
         }
     }
 
+    /// How late it is, samples.
+    pub(super) fn late(&self) -> f64 {
+        self.late
+    }
+
     /// The torque that acted, N m, but for what the ends of the range took.
     pub(super) fn seen_nm(&mut self) -> Vec<f64> {
         let log = self.log;
@@ -76,21 +81,13 @@ impl<'a> Channel<'a> {
         seen.into_owned()
     }
 
-    /// Where the channel is at an end of its range it says that the force is at least that: the law's own stands in for it there.
-    /// `false` where its range has no ends.
-    pub(super) fn fill_ends(&mut self, seen_nm: Vec<f64>, force_n: &mut [f64], by_law_n: &[f64]) -> bool {
-        let Some(ends_nm) = self.ends_nm else { return false };
-        let (low, high) = self.log.near_ends(ends_nm);
+    /// Where it is at an end of its range, so that the torque is at least (1) or at most (−1) what was seen; `None` where its
+    /// range has no ends.
+    pub(super) fn ends(&mut self, seen_nm: &[f64]) -> Option<Vec<i8>> {
+        let (low, high) = self.log.near_ends(self.ends_nm?);
         // The range ends behind the amplifier.
-        let amplified = self.amplifier(Cow::Owned(seen_nm));
-        for ((shown, force), by_law) in amplified.iter().zip(force_n).zip(by_law_n) {
-            if *shown > high {
-                *force = force.max(*by_law);
-            } else if *shown < low {
-                *force = force.min(*by_law);
-            }
-        }
-        true
+        let amplified = self.amplifier(Cow::Owned(seen_nm.to_vec()));
+        Some(amplified.iter().map(|shown| i8::from(*shown > high) - i8::from(*shown < low)).collect())
     }
 
     /// What it shows of a torque, N m.

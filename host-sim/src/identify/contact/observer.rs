@@ -19,7 +19,7 @@
 
 use super::law::Contact;
 use super::log::OBSERVED_OVER;
-use crate::identify::filters::smoothed_flat;
+use crate::identify::filters::{shifted, smoothed_flat};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Slip is faster than so many deviations of its noise.
@@ -52,12 +52,32 @@ pub struct Drive<'a> {
     pub load_n: &'a [f64],
     /// Measured friction force with the sensor taken off, N.
     pub force_n: &'a [f64],
+    /// Where the channel is at an end of its range: the force is at least (1) or at most (−1) what is measured; else 0.
+    pub ends: Option<&'a [i8]>,
     /// Factor of the friction coefficient, where something changes it.
     pub factor: Option<&'a [f64]>,
     /// Slip speed that counts as slip, m/s.
     pub slip_threshold_m_s: f64,
+    /// How late the channel is that the force was seen by, samples: its noise is interpolated on the way there and back.
+    pub late: f64,
     /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
     pub noise: (f64, f64),
+}
+
+impl Drive<'_> {
+    /// Whether the channel is at an end of its range.
+    #[inline]
+    fn at_end(&self, i: usize) -> bool {
+        self.ends.is_some_and(|ends| ends[i] != 0)
+    }
+
+    /// What the measurement says that the law does not, N; `None` of a force beyond the end that the channel is at.
+    #[inline]
+    pub(super) fn innovation_n(&self, i: usize, by_law_n: f64) -> Option<f64> {
+        let more = self.force_n[i] - by_law_n;
+        let beyond = self.ends.is_some_and(|ends| f64::from(ends[i]) * more < 0.0);
+        (!beyond).then_some(more)
+    }
 }
 
 /// What came out, sample by sample.
@@ -190,13 +210,13 @@ struct OwnNoise {
 }
 
 impl OwnNoise {
-    fn new(block: &Block, contact: &Contact, step_s: f64) -> Self {
+    fn new(block: &Block, contact: &Contact, step_s: f64, late: f64) -> Self {
         // A block that follows within 50 samples has come to rest behind the impulse.
         const SAMPLES: usize = 256;
         const AT: usize = SAMPLES / 4;
         let mut impulse = vec![0.0; SAMPLES];
         impulse[AT] = 1.0;
-        let force = smoothed_flat(&impulse, OBSERVED_OVER);
+        let force = shifted(&smoothed_flat(&impulse, OBSERVED_OVER), late);
         let mut state = SVector::<f64, 4>::zeros();
         let block_m: Vec<f64> = (0..SAMPLES)
             .map(|i| {
@@ -207,7 +227,9 @@ impl OwnNoise {
             })
             .collect();
         let rate = |i: usize| contact.damping_n_s_per_m * (block_m[i + 1] - block_m[i - 1]) / (2.0 * step_s);
-        Self { own: rate(AT), squares: (1..SAMPLES - 1).map(|i| rate(i).powi(2)).sum() }
+        let rates: Vec<f64> = (1..SAMPLES - 1).map(rate).collect();
+        let shown = shifted(&rates, -late);
+        Self { own: shown[AT - 1], squares: shown.iter().map(|x| x * x).sum() }
     }
 
     /// Variance of n − γ n∗h over that of n.
@@ -216,10 +238,10 @@ impl OwnNoise {
     }
 }
 
-/// Kalman gain of a random walk of variance `motion`² a step seen with the deviation `force` (both N).
-fn stick_gain(motion: f64, force: f64) -> f64 {
-    let ratio = (motion / force.max(1e-12)).powi(2);
-    if ratio > 1e6 { 1.0 } else { 0.5 * ((ratio * (ratio + 4.0)).sqrt() - ratio) }
+/// Kalman gain of a random walk to which each step adds so much variance, in that of what it is seen with; it is also the
+/// variance that is left.
+fn steady_gain(added: f64) -> f64 {
+    if added > 1e6 { 1.0 } else { 0.5 * ((added * (added + 4.0)).sqrt() - added) }
 }
 
 /// Runs over a log.
@@ -247,7 +269,14 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let slip_noise = drive.noise.1 / c.max(k * drive.interval_s);
     let threshold = drive.slip_threshold_m_s.max(SLIP_NOISES * slip_noise);
     let creep_noise = drive.noise.0.hypot(slip_noise);
-    let gain = stick_gain(k * drive.noise.0 * dt, drive.noise.1);
+    // Variances of k times the block's way over that of the force's noise: what a step adds, what is left at rest.
+    let added = (k * drive.noise.0 * dt / drive.noise.1.max(1e-12)).powi(2);
+    let at_rest = steady_gain(added);
+    // Of a force beyond the end of the range it is known that it is friction, until the block has forgotten it.
+    let forgets = block.transition[(0, 0)].powi(2);
+    let mut lost = f64::from(u8::from(drive.at_end(0)));
+    let seen_by = |lost: f64, load: f64| at_rest + lost * (load * coulomb / drive.noise.1.max(1e-12)).powi(2);
+    let mut variance = seen_by(lost, drive.load_n[0]);
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
     // One sample ahead, so that the slip is even about each: means before and after it, or the law is late by half a step.
     let after = |state: &SVector<f64, 4>, i: usize| {
@@ -260,7 +289,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     // Between samples that are far apart the force is not noise but a guess.
-    let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt));
+    let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt, drive.late));
     out.force_n[0] = force[0];
     for i in 1..n {
         let (observed, slipped) = (next, slips_next);
@@ -294,6 +323,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         };
         out.sliding[i] = slips;
 
+        lost = if drive.at_end(i) { 1.0 } else { lost * forgets };
+        let observed_variance = seen_by(lost, load);
         if let (Some(own), true) = (&own_noise, slips > NEGLIGIBLE) {
             let slope = loaded * contact.curve.derivative(speed) + per_load * load + film;
             out.own_noise[i] += slips * (own.left(-slope / c) - 1.0);
@@ -325,15 +356,20 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
                 breaks = sigmoid(over) * towards;
                 sticking -= sticking.signum() * beyond * towards;
             }
-            let pulled = gain * (force[i] - sticking) / k;
+            let before = variance + added;
+            let gain = before / (1.0 + before);
+            let innovation = drive.innovation_n(i, sticking);
+            let pulled = innovation.map_or(0.0, |more| gain * more / k);
+            let stuck = if innovation.is_some() { gain } else { before };
             let follows = slips + (1.0 - slips) * breaks;
+            variance = follows * observed_variance + (1.0 - follows) * stuck;
             held[0] = follows * observed[0] + (1.0 - follows) * (held[0] + moved + pulled);
             for b in 0..3 {
                 held[1 + b] = follows * observed[1 + b] + (1.0 - follows) * (held[1 + b] + moved) * branch[b];
             }
             out.force_n[i] = slips * sliding + (1.0 - slips) * sticking;
         } else {
-            held = observed;
+            (held, variance) = (observed, observed_variance);
             out.force_n[i] = sliding;
         }
         if let Some(ageing) = contact.ageing {
@@ -377,7 +413,8 @@ mod tests {
         let force_n: Vec<f64> = (0..n).map(|_| load * 0.6 + NOISE_N * noise.next()).collect();
         let smooth = smoothed_flat(&force_n, OBSERVED_OVER);
         // As with a sample missing now and then: the points are hardly closer than the samples.
-        let left = |damping: f64, stated: bool| {
+        let left = |damping: f64, late: f64, stated: bool| {
+            let seen_n = shifted(&smooth, late);
             let contact = block(25_000.0, damping, Curve::new(|w| (0.6 - slope * (w - speed)).max(0.1)));
             let drive = Drive {
                 step_s: STEP_S,
@@ -385,29 +422,66 @@ mod tests {
                 dense: true,
                 root_m: &root_m,
                 load_n: &loads,
-                force_n: &smooth,
+                force_n: &seen_n,
+                ends: None,
                 factor: None,
                 slip_threshold_m_s: 1e-3,
+                late,
                 noise: (1e-6, NOISE_N),
             };
             let seen = observe(&contact, &drive);
+            let shown = shifted(&seen.force_n, -late);
             let of = |i: usize| {
                 let variance = if stated { seen.own_noise[i] } else { 1.0 };
-                (force_n[i] - seen.force_n[i]).powi(2) / variance
+                (force_n[i] - shown[i]).powi(2) / variance
             };
             ((500..n - 500).map(of).sum::<f64>() / (n - 1000) as f64).sqrt() / NOISE_N
         };
-        // F_N |g′| is 96 N s/m.
-        for damping in [96.0, 150.0, 300.0] {
-            assert!((left(damping, true) - 1.0).abs() < 0.03, "{damping}: {}", left(damping, true));
+        // F_N |g′| is 96 N s/m. Between samples a channel that is late is interpolated, which smooths its noise.
+        for (damping, late) in [(96.0, 0.0), (150.0, 0.0), (300.0, 0.0), (96.0, 0.5), (150.0, 0.5)] {
+            let left = left(damping, late, true);
+            assert!((left - 1.0).abs() < 0.03, "{damping} {late}: {left}");
         }
         // As it is, the one at which the slope's force cancels the damper's would leave least.
-        assert!(
-            left(96.0, false) < left(300.0, false) - 0.05,
-            "{} {}",
-            left(96.0, false),
-            left(300.0, false)
-        );
+        let (near, far) = (left(96.0, 0.0, false), left(300.0, 0.0, false));
+        assert!(near < far - 0.05, "{near} {far}");
+    }
+
+    /// A block at rest, wound up beyond the end of the channel's range and down again.
+    #[test]
+    fn a_force_beyond_the_end_of_the_range_is_not_pulled_to_the_end() {
+        const STEP_S: f64 = 1e-3;
+        const STIFFNESS_N_PER_M: f64 = 25_000.0;
+        const END_N: f64 = 15.0;
+        let n = 1000;
+        let turn = std::f64::consts::TAU / n as f64;
+        let acts_n: Vec<f64> = (0..n).map(|i| 12.5 * (1.0 - (turn * i as f64).cos())).collect();
+        let contact = block(STIFFNESS_N_PER_M, 1.0, Curve::new(|_| 0.6));
+        // Largest error, but for a log's first samples and those just behind the end.
+        let off_n = |acts_n: &[f64], known: bool| {
+            let at_end: Vec<i8> = acts_n.iter().map(|f| i8::from(*f > END_N)).collect();
+            let drive = Drive {
+                step_s: STEP_S,
+                interval_s: STEP_S,
+                dense: true,
+                root_m: &acts_n.iter().map(|f| f / STIFFNESS_N_PER_M).collect::<Vec<_>>(),
+                load_n: &vec![50.0; acts_n.len()],
+                force_n: &acts_n.iter().map(|f| f.min(END_N)).collect::<Vec<_>>(),
+                ends: known.then_some(at_end.as_slice()),
+                factor: None,
+                slip_threshold_m_s: 0.02,
+                late: 0.0,
+                noise: (1e-3, 0.15),
+            };
+            let seen = observe(&contact, &drive).force_n;
+            let judged = (3..acts_n.len()).filter(|i| acts_n[0] < END_N || at_end[i - 3] == 0);
+            judged.map(|i| (seen[i] - acts_n[i]).abs()).fold(0.0, f64::max)
+        };
+        assert!(off_n(&acts_n, true) < 0.1, "{}", off_n(&acts_n, true));
+        assert!(off_n(&acts_n, false) > 5.0, "{}", off_n(&acts_n, false));
+        // From the middle of it on nothing is known of the winding until the channel shows it again.
+        let late = off_n(&acts_n[n / 2..], true);
+        assert!(late < 0.3, "{late}");
     }
 
     /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
@@ -429,8 +503,10 @@ mod tests {
                 root_m: &root_m,
                 load_n: &[10.0; 1000],
                 force_n: &force_n,
+                ends: None,
                 factor: None,
                 slip_threshold_m_s: 1e-4,
+                late: 0.0,
                 noise: (1e-5, 0.15),
             };
             let seen = observe(&contact, &drive).sliding;

@@ -268,6 +268,7 @@ impl<'a> Problem<'a> {
             let mut channel = Channel::new(log, at, change, numbers.late_ms);
             let seen_nm = channel.seen_nm();
             let mut force_n: Vec<f64> = seen_nm.iter().map(|t| t / log.radius_m).collect();
+            let ends = channel.ends(&seen_nm);
             let usual = rms(&log.root_speed_m_s);
             let factor = change.log_factor.as_ref().map(|m| exponentials(&m[at]));
             let drive = Drive {
@@ -277,15 +278,25 @@ impl<'a> Problem<'a> {
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
                 load_n: &log.load_n,
                 force_n: &[],
+                ends: ends.as_deref(),
                 factor: factor.as_deref(),
                 slip_threshold_m_s: (SLOWEST_SLIP * usual).max(SLIP_NOISES * log.speed_noise_m_s).max(1e-9),
+                late: channel.late(),
                 noise: (
                     log.speed_noise_m_s.max(DRIFT * usual),
                     log.friction_noise_nm.max(1e-12) / log.radius_m,
                 ),
             };
             let mut observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
-            if channel.fill_ends(seen_nm, &mut force_n, &observed.force_n) {
+            if let Some(ends) = &ends {
+                // The law's own force stands in for one that is beyond the end.
+                for ((end, force), by_law) in ends.iter().zip(&mut force_n).zip(&observed.force_n) {
+                    match end {
+                        1 => *force = force.max(*by_law),
+                        -1 => *force = force.min(*by_law),
+                        _ => (),
+                    }
+                }
                 observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
             }
             let torque_nm = observed.force_n.iter().map(|f| f * log.radius_m).collect();
