@@ -381,14 +381,29 @@ mod tests {
     }
 
     fn fitted(truth: &ModelFile, guess: &ModelFile, sticking: bool) -> Result<ContactFit, InputError> {
+        fitted_on(truth, guess, sticking, [1, 2])
+    }
+
+    fn fitted_on(
+        truth: &ModelFile,
+        guess: &ModelFile,
+        sticking: bool,
+        seeds: [u64; 2],
+    ) -> Result<ContactFit, InputError> {
         let rig = RigFile::assumed_rig(&[]).unwrap();
-        let logs = [log(truth, &rig, sticking, 1), log(truth, &rig, sticking, 2)];
+        let logs = seeds.map(|seed| log(truth, &rig, sticking, seed));
         identify(guess, &rig, &logs, &default_free(guess), Begin::Around, &|| ())
     }
 
+    /// Over ten pairs of logs, since one interval of twenty does not hold the truth: errors in units of what is stated are on
+    /// average none, and about one.
     #[test]
-    #[ignore = "c_u comes out 4 % low, three deviations: over ten pairs of such logs its mean is 156 for 160"]
+    #[ignore = "the interval of c_u is 1.8 times too narrow in such logs: mean square 3.2, mean 0.4; the others hold"]
     fn a_series_element_is_found_from_a_start_that_is_off_by_a_third() {
+        const PAIRS: u64 = 10;
+        /// Chi-squared of ten degrees of freedom is beyond 29.6 once in a thousand, a normal deviate beyond 3.3.
+        const MOST_MEAN_SQUARE: f64 = 2.96;
+        const MOST_MEAN: f64 = 1.04;
         let numbers = |k: f64, c: f64, a0: f64, a1: f64, v0: f64| {
             model(
                 ModelKind::Series,
@@ -403,18 +418,28 @@ mod tests {
             )
         };
         let truth = numbers(3e4, 160.0, 0.5, 0.6, 0.4);
-        let fit = fitted(&truth, &numbers(2e4, 100.0, 0.65, 0.42, 0.52), true).unwrap();
-        for (name, found) in fit.names.iter().zip(&fit.values) {
-            let value = truth.get(name).unwrap();
-            // Noise of 0.5 % of the friction on 16 000 samples, few of them in stick.
-            assert!((found / value - 1.0).abs() < 0.05, "{name}: {found} for {value}");
-            let interval = &fit.model.intervals[name];
-            assert!(interval.low < value && value < interval.high, "{name}: {interval:?}");
-            // The three numbers of the curve are known together, not each alone.
-            let most = if matches!(name.as_str(), "a0" | "a1" | "v0_m_s") { 0.15 } else { 0.02 };
-            assert!(interval.std < most * value, "{name}: {interval:?}");
+        let guess = numbers(2e4, 100.0, 0.65, 0.42, 0.52);
+        let mut off: std::collections::BTreeMap<String, Vec<f64>> = std::collections::BTreeMap::new();
+        for pair in 0..PAIRS {
+            let fit = fitted_on(&truth, &guess, true, [2 * pair + 1, 2 * pair + 2]).unwrap();
+            for (name, found) in fit.names.iter().zip(&fit.values) {
+                let value = truth.get(name).unwrap();
+                // Noise of 0.5 % of the friction on 16 000 samples, few of them in stick.
+                assert!((found / value - 1.0).abs() < 0.05, "{name}: {found} for {value}");
+                let interval = &fit.model.intervals[name];
+                // The three numbers of the curve are known together, not each alone.
+                let most = if matches!(name.as_str(), "a0" | "a1" | "v0_m_s") { 0.15 } else { 0.02 };
+                assert!(interval.std < most * value, "{name}: {interval:?}");
+                off.entry(name.clone()).or_default().push((found - value) / interval.std);
+            }
+            assert!(fit.nrmse_by_observed_slip < 0.02, "{}", fit.nrmse_by_observed_slip);
         }
-        assert!(fit.nrmse_by_observed_slip < 0.02, "{}", fit.nrmse_by_observed_slip);
+        for (name, off) in off {
+            let mean = off.iter().sum::<f64>() / PAIRS as f64;
+            let square = off.iter().map(|z| z * z).sum::<f64>() / PAIRS as f64;
+            println!("{name}: mean {mean:.2}, mean square {square:.2}");
+            assert!(mean.abs() < MOST_MEAN && square < MOST_MEAN_SQUARE, "{name}: {off:.2?}");
+        }
     }
 
     /// A block that follows within one and a half samples: smoothing and interpolation of the force tell of another one.
