@@ -7,6 +7,7 @@
 //! again. Moving several files is not one step of the file system.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -131,8 +132,12 @@ impl OutputDir {
             .map(Path::to_path_buf)
             .collect();
         for path in missing.into_iter().rev() {
-            fs::create_dir(&path).map_err(|e| InputError::io(&path, "make this folder", &e))?;
-            self.made.push(path);
+            match fs::create_dir(&path) {
+                Ok(()) => self.made.push(path),
+                // Another process was quicker with a folder that both need: it is that one's.
+                Err(e) if e.kind() == ErrorKind::AlreadyExists && path.is_dir() => (),
+                Err(e) => return Err(InputError::io(&path, "make this folder", &e)),
+            }
         }
         Ok(())
     }
@@ -237,6 +242,25 @@ mod tests {
         output.write("x.json", "{}").unwrap();
         drop(output);
         assert!(names(root.path()).is_empty());
+    }
+
+    #[test]
+    fn two_that_write_beside_each_other_do_not_mind_who_makes_the_folder() {
+        for _ in 0..200 {
+            let root = tempfile::tempdir().unwrap();
+            let start = std::sync::Barrier::new(2);
+            let make = &|name: &str| {
+                let target = root.path().join("all").join(name);
+                start.wait();
+                let mut output = OutputDir::new(&target).unwrap();
+                output.write("x.json", "{}").unwrap();
+                output.finish().unwrap();
+            };
+            std::thread::scope(|scope| {
+                ["a", "b"].map(|name| scope.spawn(move || make(name))).map(|thread| thread.join().unwrap())
+            });
+            assert_eq!(names(&root.path().join("all")), ["a", "b"]);
+        }
     }
 
     #[test]
