@@ -12,7 +12,7 @@ use super::judge::{ContactPart, DiscCause};
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts, or where it swings as mains do.
 const BLOCKS_S: [f64; 2] = [0.05, 0.005];
 /// Deviations from named sources are known within this factor before anything is fitted to the residuals.
-const NAMED_WITHIN: f64 = 1.5;
+pub const NAMED_WITHIN: f64 = 1.5;
 /// What a form is known to, [`MODEL_FORM`] of the signal or a share of a cause, so many times is beyond it, whatever its shape.
 const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.

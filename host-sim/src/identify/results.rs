@@ -8,6 +8,7 @@ use super::effects::LIBRARY;
 use super::extended_model::Values;
 use super::holdout::{Errors, LogErrors};
 use super::judge::{Hypothesis, Judgement, Part};
+use super::rest::NAMED_WITHIN;
 use crate::files::effect_id::subsystem_of;
 
 /// Hypotheses written out; the others are summed up.
@@ -162,20 +163,22 @@ impl Diagnosis {
         let extended = shown.map_or(nothing, |s| s.extended.clone());
         let remaining = remaining(judged, main);
         let groups = groups(judged, verdict);
-        let sentence = sentence(verdict, &causes, &baseline, &extended, &remaining);
+        let apart = apart(found);
+        let sentence = sentence(verdict, &causes, &baseline, &extended, &remaining, &apart);
+        let notes = judged.notes.iter().cloned().chain(apart.iter().map(Apart::sentence)).collect();
         Self {
             verdict,
             sentence,
             baseline,
             rejected: rejected(judged, verdict, &marginal),
-            next_experiment: next(judged, verdict, &groups),
+            next_experiment: next(judged, verdict, &groups, &apart),
             indistinguishable: groups,
             causes,
             extended,
             posterior: posterior(judged),
             remaining,
             subsystems,
-            notes: judged.notes.clone(),
+            notes,
             wall_s,
         }
     }
@@ -283,6 +286,39 @@ fn remaining(judged: &Judgement, part: Part) -> Remaining {
     }
 }
 
+/// A balance in which the answer leaves more of the held-out logs than of those that it was fitted to.
+struct Apart {
+    part: Part,
+    /// RMS of what is left over that of the noise, held out and fitted.
+    times_noise: [f64; 2],
+}
+
+impl Apart {
+    fn sentence(&self) -> String {
+        let [holdout, train] = self.times_noise;
+        format!(
+            "in the balance of the {} the answer leaves {holdout:.1} times the noise on the held-out logs, {train:.1} times it on the \
+             training logs: the held-out runs show something that the training runs do not",
+            self.part.name()
+        )
+    }
+}
+
+/// Held-out logs decide nothing, but that an answer does not hold for them is said.
+fn apart(found: &Found<'_>) -> Vec<Apart> {
+    let ratio = |errors: &Errors| errors.nrmse().filter(|e| e[2] > 0.0).map(|e| e[1] / e[2]);
+    found
+        .holdout
+        .iter()
+        .filter_map(|(part, holdout)| {
+            let train = found.train.iter().find(|(p, _)| p == part).and_then(|(_, errors)| ratio(errors))?;
+            Some(Apart { part: *part, times_noise: [ratio(holdout)?, train] })
+        })
+        // Noise is known within the factor; a training log that is better than it is so by chance or by fitting.
+        .filter(|apart| apart.times_noise[0] > NAMED_WITHIN * apart.times_noise[1].max(1.0))
+        .collect()
+}
+
 fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Cause {
     let judged = found.judgement;
     let about = LIBRARY.iter().map(|e| e.about()).find(|a| a.id == id);
@@ -386,7 +422,7 @@ fn groups(judged: &Judgement, verdict: &str) -> Vec<Vec<String>> {
     out
 }
 
-fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>]) -> String {
+fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>], apart: &[Apart]) -> String {
     let about = |id: &str| LIBRARY.iter().map(|e| e.about()).find(|a| a.id == id);
     if let Some(pair) = groups.first() {
         let texts: Vec<&str> = pair.iter().filter_map(|id| about(id).map(|a| a.experiment)).collect();
@@ -405,6 +441,9 @@ fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>]) -> String {
                 None => "To see what the rest is: repeat the same run twice; what does not repeat is no property of the rig.".into(),
             }
         }
+        _ if !apart.is_empty() => {
+            "To see what the held-out runs show and the training runs do not: give runs like them to --train as well.".into()
+        }
         _ => "Nothing is open: hold out a run with larger speeds and loads than these.".into(),
     }
 }
@@ -415,6 +454,7 @@ fn sentence(
     base: &BaselineErrors,
     extended: &ExtendedErrors,
     rest: &Remaining,
+    apart: &[Apart],
 ) -> String {
     let text = |x: Option<f64>| x.map_or("unknown".to_string(), percent);
     match verdict {
@@ -431,7 +471,8 @@ fn sentence(
         }
         "unknown" => format!("Something is wrong that nothing in the library explains. {}", rest.sentence),
         _ => format!(
-            "Nothing is wrong beyond noise: the baseline's error on the held-out logs is {}, noise alone leaves {}.",
+            "Nothing is wrong beyond noise{}: the baseline's error on the held-out logs is {}, noise alone leaves {}.",
+            if apart.is_empty() { "" } else { " in the training logs, but the held-out logs differ" },
             text(base.holdout_nrmse),
             text(extended.noise_floor_nrmse)
         ),

@@ -4,15 +4,21 @@
 use host_sim::files::log::Log;
 use host_sim::files::model_file::ModelFile;
 use host_sim::files::rig_file::RigFile;
+use host_sim::files::signal::Signal;
 use host_sim::identify::command::{Written, diagnose};
 use rig_tests::{Base, Effect, Scenario, generate};
 
 fn answer(effects: &[Effect], seed: u64, base: Base) -> Written {
+    answer_held_out(effects, seed, base, |holdout| holdout)
+}
+
+/// The same with the held-out log changed.
+fn answer_held_out(effects: &[Effect], seed: u64, base: Base, change: impl Fn(Log) -> Log) -> Written {
     let case = generate(&Scenario { base, ..Scenario::new(effects, seed) }).unwrap();
     let log = |name: &str, text: &String| Log::parse_csv(name, text.as_bytes()).unwrap();
     let train: Vec<Log> =
         case.train.iter().enumerate().map(|(i, text)| log(&format!("train{i}"), text)).collect();
-    let holdout = log("holdout", &case.holdout);
+    let holdout = change(log("holdout", &case.holdout));
     let rig = RigFile::parse("rig", &case.rig_toml).unwrap();
     let model = ModelFile::parse("model", &case.model_toml).unwrap();
     diagnose(&train, &[holdout], &rig, &model, &|| 0.0, &|_| ()).unwrap()
@@ -40,6 +46,27 @@ fn a_clean_log_is_answered_with_nothing() {
     let written = answer(&[], 103, Base::Series);
     assert_eq!(written.diagnosis.verdict, "none", "{}", written.diagnosis.sentence);
     assert!(written.diagnosis.posterior["none"] > 0.5);
+    assert!(
+        !written.diagnosis.notes.iter().any(|note| note.contains(APART)),
+        "{:?}",
+        written.diagnosis.notes
+    );
+}
+
+const APART: &str = "the held-out runs show something that the training runs do not";
+
+/// A gain that another run was made with decides nothing, and is not passed over.
+#[test]
+fn a_held_out_log_that_the_answer_does_not_hold_for_is_told() {
+    let written = answer_held_out(&[], 103, Base::Series, |mut log| {
+        let torque = log.contact().unwrap().friction_torque_nm.iter().map(|t| 1.1 * t).collect();
+        log.set_signal(Signal::FrictionTorque, torque);
+        log
+    });
+    let diagnosis = &written.diagnosis;
+    assert_eq!(diagnosis.verdict, "none", "{}", diagnosis.sentence);
+    assert!(diagnosis.notes.iter().any(|note| note.contains(APART)), "{:?}", diagnosis.notes);
+    assert!(diagnosis.next_experiment.contains("to --train as well"), "{}", diagnosis.next_experiment);
 }
 
 #[test]
