@@ -27,7 +27,7 @@ use crate::input_error::InputError;
 /// A hypothesis has at most so many causes: more are no explanation but a fit, and what they would explain is left as it is.
 const MOST_CAUSES: usize = 3;
 /// ln of the prior probability that an effect of the library acts: one in fifty.
-const LOG_PRIOR: f64 = -3.9;
+pub const LOG_PRIOR: f64 = -3.9;
 /// A set with so much less ln evidence than the best one is not the answer, e^−60 of it, however small the best one's causes
 /// are: their subsets stand in the table too.
 const OUT_OF_QUESTION: f64 = 60.0;
@@ -240,7 +240,12 @@ impl Linear {
     pub fn rest(&self, place: usize) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());
         let solved = &self.solved[place];
-        rest::of_balance(&self.balance, &solved.residual, none.map(|s| s.residual.as_slice()))
+        rest::of_balance(
+            &self.balance,
+            &solved.residual,
+            none.map(|s| s.residual.as_slice()),
+            solved.set.len(),
+        )
     }
 }
 

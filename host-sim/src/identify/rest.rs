@@ -7,7 +7,7 @@ use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Fit, Problem};
 use super::contact::search;
 use super::filters::rms;
-use super::judge::{ContactPart, DiscCause};
+use super::judge::{ContactPart, DiscCause, LOG_PRIOR};
 
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts, or where it swings as mains do.
 const BLOCKS_S: [f64; 2] = [0.05, 0.005];
@@ -36,19 +36,24 @@ pub struct Rest {
     pub explained: f64,
     /// Mean square of the structured rest over that of the noise.
     pub times_noise: f64,
+    /// Causes beyond the first in a set that is weighed as a whole, in a linear balance.
+    pub further_causes: usize,
     /// What it goes along with: quantity and share of its variance.
     pub follows: Vec<(String, f64)>,
 }
 
 impl Rest {
     /// Probability that it is something that the library does not have: larger than the form of a model is wrong, as large
-    /// as what a cause explains, not a trace of what the baseline leaves, and more than noise leaves.
+    /// as what a cause explains, not a trace of what the baseline leaves, and more than noise leaves. One thing unknown stands
+    /// against causes each of which is improbable: several that together fit in part only are the less likely.
     pub fn unknown(&self) -> f64 {
         let step = |ratio: f64| 1.0 / (1.0 + (-STEEPNESS * ratio.max(1e-9).ln()).exp());
-        step(self.size / (BEYOND_FORM * MODEL_FORM))
+        let alone = step(self.size / (BEYOND_FORM * MODEL_FORM))
             * step(self.size / (MOST * self.explained).max(1e-12))
             * step(self.share / LEAST_SHARE)
-            * step(self.times_noise)
+            * step(self.times_noise);
+        let odds = alone * (-LOG_PRIOR * self.further_causes as f64).exp();
+        odds / (1.0 - alone + odds)
     }
 }
 
@@ -242,6 +247,7 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
         times_noise: rest / left.max(1e-300),
+        further_causes: 0,
         follows: if rest > 0.0 {
             follows(&residual, &ground.rows, ground.blocks[0], &contact_quantities(contact))
         } else {
@@ -322,8 +328,8 @@ pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &
     Contribution { size: change / signal.max(1e-12), over_rest: change / (LEFT_SHARE * left) }
 }
 
-/// Of a linear balance. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.
-pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> Rest {
+/// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.
+pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>, causes: usize) -> Rest {
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
     let noise = Noise::white(balance.first_deviation.clone());
@@ -335,6 +341,7 @@ pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>) -> 
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained / balance.scale.max(1e-12),
         times_noise: rest / left.max(1e-300),
+        further_causes: causes.saturating_sub(1),
         follows: follows(residual, &balance.used, block, &[("time".into(), time)]),
     }
 }
@@ -369,5 +376,20 @@ mod tests {
         let rest = |times_noise| Rest { size: 0.05, share: 0.3, times_noise, ..Rest::default() };
         assert!(rest(0.5).unknown() < 0.05, "{}", rest(0.5).unknown());
         assert!(rest(5.0).unknown() > 0.9, "{}", rest(5.0).unknown());
+    }
+
+    #[test]
+    fn causes_that_explain_together_what_one_would_are_the_less_likely() {
+        let rest = |further_causes| Rest {
+            size: 0.02,
+            share: 0.12,
+            explained: 0.055,
+            times_noise: 3000.0,
+            further_causes,
+            ..Rest::default()
+        };
+        assert!(rest(0).unknown() < 0.1, "{}", rest(0).unknown());
+        assert!(rest(2).unknown() > 0.9, "{}", rest(2).unknown());
+        assert!(Rest { size: 0.004, share: 0.005, ..rest(2) }.unknown() < 0.01);
     }
 }
