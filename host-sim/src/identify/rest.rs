@@ -328,7 +328,8 @@ pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &
     Contribution { size: change / signal.max(1e-12), over_rest: change / (LEFT_SHARE * left) }
 }
 
-/// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set explains counts.
+/// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set
+/// explains counts.
 pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>, causes: usize) -> Rest {
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
@@ -391,5 +392,8 @@ mod tests {
         assert!(rest(0).unknown() < 0.1, "{}", rest(0).unknown());
         assert!(rest(2).unknown() > 0.9, "{}", rest(2).unknown());
         assert!(Rest { size: 0.004, share: 0.005, ..rest(2) }.unknown() < 0.01);
+        // Each costs its prior.
+        let odds = |further| rest(further).unknown() / (1.0 - rest(further).unknown());
+        assert!((odds(1) / odds(0) * LOG_PRIOR.exp() - 1.0).abs() < 1e-9);
     }
 }

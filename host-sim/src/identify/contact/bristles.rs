@@ -73,8 +73,8 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
         out.sliding[i] = slips;
         out.certainty[i] = (channel / (variance + channel)).sqrt();
         let gain = variance / (variance + channel);
-        if let Some(more) = drive.innovation_n(i, shown) {
-            held_n += gain * more;
+        held_n += gain * drive.innovation_n(i, shown);
+        if !drive.at_end(i) {
             variance *= 1.0 - gain;
         }
         if let (Some(ageing), Some(age)) = (&contact.ageing, &mut age) {

@@ -83,10 +83,10 @@ impl<'a> Channel<'a> {
 
     /// Where it is at an end of its range, so that the torque is at least (1) or at most (−1) what was seen; `None` where its
     /// range has no ends.
-    pub(super) fn ends(&mut self, seen_nm: &[f64]) -> Option<Vec<i8>> {
+    pub(super) fn ends(&mut self, seen_nm: Vec<f64>) -> Option<Vec<i8>> {
         let (low, high) = self.log.near_ends(self.ends_nm?);
         // The range ends behind the amplifier.
-        let amplified = self.amplifier(Cow::Owned(seen_nm.to_vec()));
+        let amplified = self.amplifier(Cow::Owned(seen_nm));
         Some(amplified.iter().map(|shown| i8::from(*shown > high) - i8::from(*shown < low)).collect())
     }
 

@@ -268,7 +268,7 @@ impl<'a> Problem<'a> {
             let mut channel = Channel::new(log, at, change, numbers.late_ms);
             let seen_nm = channel.seen_nm();
             let mut force_n: Vec<f64> = seen_nm.iter().map(|t| t / log.radius_m).collect();
-            let ends = channel.ends(&seen_nm);
+            let ends = channel.ends(seen_nm);
             let usual = rms(&log.root_speed_m_s);
             let factor = change.log_factor.as_ref().map(|m| exponentials(&m[at]));
             let drive = Drive {
