@@ -2,9 +2,10 @@
 
 use super::extended_model::{self, Values};
 use super::holdout;
-use super::judge::{Judgement, Part, judge};
+use super::judge::{Judgement, judge};
 use super::page;
 use super::results::{Diagnosis, Found};
+use super::table::Part;
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;

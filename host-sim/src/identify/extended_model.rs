@@ -12,8 +12,12 @@ use super::contact::baseline::has_block;
 use super::contact::log::ContactLog;
 use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
+use super::contact_part::ContactPart;
+use super::effects::LIBRARY;
 use super::fit_contact::{self, Begin};
-use super::judge::{ContactPart, Judgement, Linear, Part};
+use super::judge::Judgement;
+use super::linear_part::Linear;
+use super::table::Part;
 use super::{fit_interval, fit_parameters};
 use crate::files::log::Log;
 use crate::files::model_file::{Extension, ModelFile, ModelKind};
@@ -109,10 +113,11 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
         let core = CoreExtension::with_id(term.effect).map(CoreExtension::names).unwrap_or_default();
         // A form of which the core has nothing is told, and not predicted.
         if term.export.is_some() && core.iter().any(|name| exported.contains_key(*name)) {
-            let parameters = core
-                .iter()
-                .map(|name| ((*name).to_string(), exported.get(*name).map_or(0.0, |v| v.value)))
-                .collect();
+            let absent = |name: &str| {
+                LIBRARY.iter().find(|e| e.id() == term.effect).map_or(0.0, |effect| effect.absent(name))
+            };
+            let value = |name: &str| exported.get(name).map_or_else(|| absent(name), |v| v.value);
+            let parameters = core.iter().map(|name| ((*name).to_string(), value(name))).collect();
             extensions.push(Extension { id: term.effect.into(), parameters });
         }
         values.entry(term.effect).or_default().extend(exported);

@@ -7,10 +7,13 @@
 use super::balance::{Alternative, Balance, Company, Solved};
 use super::contact::log::ContactLog;
 use super::contact::problem::Problem;
+use super::contact_part::{self, ContactPart};
 use super::drive::{self, DriveLog, DriveScales};
 use super::effects::{DriveView, LIBRARY, NormalLoadView};
-use super::judge::{self, ContactPart, Judgement, Linear, Part};
+use super::judge::Judgement;
+use super::linear_part::{self, Linear};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
+use super::table::Part;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
@@ -111,7 +114,7 @@ pub fn errors(
         let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
         let fit = contact.fit(place);
         let change = contact.problem().change(&fit.terms, &fit.p);
-        let sensed = judge::without_ends(&prepared, &change);
+        let sensed = contact_part::without_ends(&prepared, &change);
         let drives: Option<Vec<DriveLog>> = sensed
             .as_ref()
             .unwrap_or(&prepared)
@@ -126,7 +129,8 @@ pub fn errors(
                     let (_, fixed) = drive_alternatives(found, drive, drives, Some(rig));
                     let solved = &drive.solved[found.place(Part::Drive).unwrap_or(0)];
                     let forms = known_forms(drive, solved, &fixed).filter_map(|(form, p)| Some((form, p?)));
-                    judge::following(&prepared, forms).map(|(_, ways)| judge::known_by(&ways, cause.way))
+                    contact_part::following(&prepared, forms)
+                        .map(|(_, ways)| contact_part::known_by(&ways, cause.way))
                 }
             }
             _ => None,
@@ -136,7 +140,7 @@ pub fn errors(
         if let (Some(drive), Some(drives)) = (&found.drive, drives) {
             out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), training)));
         }
-        let sensed = judge::without_normal_end(&prepared, &change);
+        let sensed = contact_part::without_normal_end(&prepared, &change);
         let load_logs: Option<Vec<NormalLoadLog>> =
             sensed.as_ref().unwrap_or(&prepared).iter().map(NormalLoadLog::new).collect();
         if let (Some(normal_load), Some(load_logs)) = (&found.normal_load, load_logs) {
@@ -163,7 +167,8 @@ fn contact_errors(
     logs: &[ContactLog],
     training: bool,
 ) -> Errors {
-    let terms = judge::contact_terms(logs, &contact.scales, training, contact.logs.len(), contact.block);
+    let terms =
+        contact_part::contact_terms(logs, &contact.scales, training, contact.logs.len(), contact.block);
     // The forms stand in the same order, but that a held-out log may offer some that the training logs did not.
     let find = |term: usize| {
         let own = &contact.terms[term];
@@ -313,7 +318,7 @@ fn drive_alternatives(
     rig: Option<&RigFile>,
 ) -> (Balance, Vec<Alternative>) {
     let nothing = drive::DrivePrior { inertia: None, coulomb: None, viscous: None };
-    let prior = rig.map_or(nothing, judge::drive_prior);
+    let prior = rig.map_or(nothing, linear_part::drive_prior);
     let scales = DriveScales::new(logs);
     let balance = drive::balance(logs, &prior, &scales);
     let solved = &part.solved[found.place(Part::Drive).unwrap_or(0)];

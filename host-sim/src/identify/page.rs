@@ -1,9 +1,11 @@
 //! `report.html`: the verdict, the probabilities, what each effect's law looks like against the residual, what is left.
 
 use super::contact::problem::Fit;
+use super::contact_part::{ContactPart, coordinates_of};
 use super::holdout::Errors;
-use super::judge::{ContactPart, Judgement, Part};
+use super::judge::Judgement;
 use super::results::Diagnosis;
+use super::table::Part;
 use crate::report::chart::{Chart, Line, Panel, Role, Window};
 use crate::report::page::{Block, Page, Table};
 use crate::report::value;
@@ -127,7 +129,7 @@ fn over_coordinates(contact: &ContactPart, place: usize) -> Vec<Chart> {
     let used: Vec<usize> =
         (0..deviation.len()).filter(|i| deviation[*i] < limit && none.r[*i] != 0.0).collect();
     let residual = |fit: &Fit, i: usize| fit.r[i] * deviation[i];
-    let coordinates = super::judge::coordinates_of(&contact.logs, &contact.scales);
+    let coordinates = coordinates_of(&contact.logs, &contact.scales);
     let mut charts: Vec<(f64, Chart)> = coordinates
         .into_iter()
         .filter_map(|(name, values)| {

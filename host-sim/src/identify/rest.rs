@@ -6,8 +6,9 @@ use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Fit, Problem};
 use super::contact::search;
+use super::contact_part::{ContactPart, DiscCause};
 use super::filters::rms;
-use super::judge::{ContactPart, DiscCause, LOG_PRIOR};
+use super::table::LOG_PRIOR;
 
 /// Blocks over which residuals are averaged, s: what is left is structured where it lasts, or where it swings as mains do.
 const BLOCKS_S: [f64; 2] = [0.05, 0.005];

@@ -7,8 +7,10 @@ use serde::Serialize;
 use super::effects::LIBRARY;
 use super::extended_model::Values;
 use super::holdout::{Errors, LogErrors};
-use super::judge::{Hypothesis, Judgement, Part};
+use super::judge::Judgement;
+use super::linear_part::Linear;
 use super::rest::NAMED_WITHIN;
+use super::table::{Hypothesis, Part};
 use crate::files::effect_id::subsystem_of;
 
 /// Hypotheses written out; the others are summed up.
@@ -235,9 +237,8 @@ fn acting(judged: &Judgement, part: Part) -> Vec<&'static str> {
         }),
         Part::Drive | Part::Pressure => {
             let linear = if part == Part::Drive { &judged.drive } else { &judged.normal_load };
-            let effects = |l: &super::judge::Linear| {
-                l.solved[place].set.iter().map(|a| l.alternatives[*a].effect).collect()
-            };
+            let effects =
+                |l: &Linear| l.solved[place].set.iter().map(|a| l.alternatives[*a].effect).collect();
             linear.as_ref().map_or(Vec::new(), effects)
         }
     }

@@ -7,7 +7,7 @@ use model_core::extension::load_dependence::LoadDependence as Law;
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
-use crate::identify::judge::ContactPart;
+use crate::identify::contact_part::ContactPart;
 use crate::identify::term::{Parameter, Starts};
 
 /// Loads below this share of the usual one do not count for the affine law.

@@ -7,8 +7,8 @@ pub mod waves;
 use crate::identify::balance::{Alternative, Balance, Company};
 use crate::identify::contact::change::{Change, ContactTerm};
 use crate::identify::contact::log::ContactLog;
+use crate::identify::contact_part::ContactPart;
 use crate::identify::drive::{DriveLog, DriveScales};
-use crate::identify::judge::ContactPart;
 use crate::identify::normal_load::{NormalLoadLog, NormalLoadScales};
 use coordinates::Coordinates;
 
@@ -118,6 +118,11 @@ pub trait Effect: Sync {
     /// What it changes in the contact's balance, in one or more forms.
     fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
         Vec::new()
+    }
+
+    /// Value of a parameter of the core's law that the fitted form does not have.
+    fn absent(&self, _parameter: &str) -> f64 {
+        0.0
     }
 
     /// What its fitted law says beyond its parameters, as a clause with units.

@@ -1,0 +1,262 @@
+//! The contact, searched, and what the drive's causes and the channels' ends change in the other balances.
+
+use rayon::prelude::*;
+
+use super::balance::Alternative;
+use super::contact::baseline;
+use super::contact::change::{Change, ContactTerm};
+use super::contact::log::ContactLog;
+use super::contact::noise::MODEL_FORM;
+use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
+use super::contact::search;
+use super::effects::coordinates::{Coordinates, Scales};
+use super::effects::{ContactView, LIBRARY};
+use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
+use super::linear_part::Linear;
+use super::rest::{Contribution, Ground};
+use super::table::{Candidate, LOG_PRIOR};
+use crate::files::model_file::ModelFile;
+
+/// A set with so much less ln evidence than the best one is not the answer, e^−60 of it, however small the best one's causes
+/// are: their subsets stand in the table too.
+const OUT_OF_QUESTION: f64 = 60.0;
+
+/// The contact, searched.
+pub struct ContactPart {
+    /// Training logs.
+    pub logs: Vec<ContactLog>,
+    /// Scales of the columns.
+    pub scales: Scales,
+    /// Baseline.
+    pub baseline: Baseline,
+    /// Whether the baseline has a block.
+    pub block: bool,
+    /// Forms of the effects.
+    pub terms: Vec<ContactTerm>,
+    /// Noise as refitted.
+    pub noise: Noise,
+    /// Sets, best first.
+    pub ranked: Vec<search::Ranked>,
+    /// Of each set, what each of its terms does.
+    pub contributions: Vec<Vec<Contribution>>,
+    /// The drive's cause that moves the contact otherwise than the encoder says.
+    pub disc_cause: Option<DiscCause>,
+}
+
+/// A cause in the drive that moves the contact.
+pub struct DiscCause {
+    /// In which of its form's ways the disc's motion is reckoned, the one with which the baseline leaves least, and the next
+    /// best one: as far as the two differ it is not known.
+    pub way: [usize; 2],
+    /// Its id.
+    pub effect: &'static str,
+    /// Residuals of the baseline with the motion as logged, N m.
+    pub residual_nm: Vec<f64>,
+}
+
+impl ContactPart {
+    /// Searches the training logs, with what the drive says of the disc's motion; beside it what the best set changes.
+    pub fn searched(
+        logs: Vec<ContactLog>,
+        model: &ModelFile,
+        drive: Option<&Linear>,
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> (Self, Change) {
+        let block = baseline::has_block(model);
+        let baseline = baseline::baseline(model, baseline::KNOWN_WITHIN);
+        let (logs, disc_cause) = with_disc_motion(logs, &baseline, drive);
+        let scales = Scales::new(&logs);
+        let terms = contact_terms(&logs, &scales, true, logs.len(), block);
+        let mut problem = Problem::new(&logs, &baseline, &terms);
+        let ranked = search::search(&mut problem, progress).ranked;
+        let contributions = contributions(&problem, &ranked);
+        let best = of_largest_posterior(&ranked, &contributions);
+        let best = problem.change(&best.terms, &best.p);
+        let noise = problem.noise.clone();
+        (Self { logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }, best)
+    }
+
+    /// The likelihood of the training logs.
+    pub fn problem(&self) -> Problem<'_> {
+        Problem::with_noise(&self.logs, &self.baseline, &self.terms, self.noise.clone())
+    }
+
+    /// What an effect changes in a candidate, and the contact's numbers there.
+    pub fn change_by(&self, place: usize, effect: &str) -> Option<(Change, Numbers)> {
+        let fit = self.fit(place);
+        let mut at = self.baseline.free.len();
+        for term in fit.terms.iter().map(|t| &self.terms[*t]) {
+            let values = &fit.p[at..at + term.parameters.len()];
+            if term.effect == effect {
+                let mut change = Change::default();
+                (term.act)(values, &mut change);
+                return Some((change, self.baseline.numbers(&fit.p)));
+            }
+            at += term.parameters.len();
+        }
+        None
+    }
+
+    /// The fit of a candidate.
+    pub fn fit(&self, place: usize) -> &Fit {
+        &self.ranked[place].fit
+    }
+
+    /// The sets found, for the table.
+    pub fn candidates(&self) -> Vec<Candidate> {
+        let mut out = Vec::new();
+        for (place, (ranked, contributions)) in self.ranked.iter().zip(&self.contributions).enumerate() {
+            let fit = &ranked.fit;
+            // A sum of columns finds its shape, a law has one.
+            let of_term = |term: &usize| {
+                let term = &self.terms[*term];
+                let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
+                (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
+            };
+            let terms = fit.terms.iter().map(of_term).zip(contributions);
+            let mut effects: Vec<(&'static str, f64, Contribution)> =
+                terms.map(|((effect, form), own)| (effect, form, *own)).collect();
+            effects.sort_by_key(|e| e.0);
+            out.push(Candidate {
+                effects: effects.iter().map(|e| e.0).collect(),
+                log_evidence: ranked.log_evidence,
+                place,
+                contributions: effects.iter().map(|e| e.2).collect(),
+                forms: effects.iter().map(|e| e.1).collect(),
+            });
+        }
+        out
+    }
+}
+
+/// Terms of all effects for these logs.
+pub fn contact_terms(
+    logs: &[ContactLog],
+    scales: &Scales,
+    training: bool,
+    train_count: usize,
+    block: bool,
+) -> Vec<ContactTerm> {
+    let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
+    let view = ContactView { logs, coordinates: &coordinates, scales, training, train_count, block };
+    LIBRARY.iter().flat_map(|effect| effect.contact(&view)).collect()
+}
+
+/// What each term of each set does. Without it the others are fitted again where the set is in question.
+fn contributions(problem: &Problem<'_>, ranked: &[search::Ranked]) -> Vec<Vec<Contribution>> {
+    let best = ranked.first().map_or(0.0, |r| r.log_evidence);
+    let in_question = |ranked: &&search::Ranked| best - ranked.log_evidence <= OUT_OF_QUESTION;
+    let mut fitted: Vec<&Fit> = ranked.iter().map(|r| &r.fit).collect();
+    let subsets = search::subsets(problem, ranked.iter().filter(in_question).map(|r| &r.fit), &fitted);
+    fitted.extend(&subsets);
+    let ground = Ground::new(problem, &ranked[0].fit);
+    let of_set = |ranked: &search::Ranked| {
+        let fit = &ranked.fit;
+        let without = if in_question(&ranked) {
+            search::without_each(problem, fit, &fitted)
+        } else {
+            search::without_each_as_they_are(problem, fit)
+        };
+        ground.contributions(problem, fit, &without)
+    };
+    ranked.par_iter().map(of_set).collect()
+}
+
+/// The logs with the disc's own motion where a cause in the drive parts it from the encoder's, and the baseline leaves less with
+/// it: that motion is the better known one.
+fn with_disc_motion(
+    logs: Vec<ContactLog>,
+    baseline: &Baseline,
+    drive: Option<&Linear>,
+) -> (Vec<ContactLog>, Option<DiscCause>) {
+    let parted = drive.and_then(|drive| {
+        let best = drive.solved.first()?;
+        let forms = best.forms(&drive.alternatives).map(|(form, places)| (form, &best.p[places]));
+        following(&logs, forms)
+    });
+    let Some((effect, ways)) = parted else { return (logs, None) };
+    let (residual_nm, as_logged) = left_by_baseline(&logs, baseline);
+    let mut left: Vec<(usize, f64)> =
+        ways.par_iter().map(|logs| left_by_baseline(logs, baseline).1).enumerate().collect();
+    left.sort_by(|a, b| a.1.total_cmp(&b.1));
+    if left[0].1 >= as_logged {
+        return (logs, None);
+    }
+    let way = [left[0].0, left.get(1).unwrap_or(&left[0]).0];
+    (known_by(&ways, way), Some(DiscCause { effect, way, residual_nm }))
+}
+
+/// The fit of the set that is the likeliest with its prior and in which no cause is too small to be told: a channel has an end
+/// where more says so than that nothing is lost by one.
+fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], contributions: &[Vec<Contribution>]) -> &'r Fit {
+    let posterior = |r: &search::Ranked| r.log_evidence + LOG_PRIOR * r.fit.terms.len() as f64;
+    let large = |own: &Contribution| own.size > MODEL_FORM;
+    let told = ranked.iter().zip(contributions).filter(|(_, all)| all.iter().all(large));
+    let best = told.map(|(r, _)| r).max_by(|a, b| posterior(a).total_cmp(&posterior(b)));
+    &best.unwrap_or(&ranked[0]).fit
+}
+
+/// Where the friction channel shows an end of its range, the drive's balance has no friction torque; `None` where it does not.
+pub fn without_ends(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
+    let ends = change.ends_nm?;
+    let mut seen = logs.to_vec();
+    seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
+    Some(seen)
+}
+
+/// Where the normal channel shows its end, the actuator's balance has no normal force; `None` where it does not.
+pub fn without_normal_end(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
+    let (end_n, knee_n) = change.normal_end_n?;
+    let mut seen = logs.to_vec();
+    seen.iter_mut().for_each(|log| log.leave_out_normal_end(end_n, knee_n));
+    Some(seen)
+}
+
+/// The logs with the disc's own motion, reckoned in each way, where one of these forms, with these values, parts it from the
+/// motor's encoder; the cause's id before them.
+pub fn following<'f>(
+    logs: &[ContactLog],
+    mut forms: impl Iterator<Item = (&'f Alternative, &'f [f64])>,
+) -> Option<(&'static str, Vec<Vec<ContactLog>>)> {
+    let (effect, disc, values) =
+        forms.find_map(|(form, values)| Some((form.effect, form.disc.as_ref()?, values)))?;
+    let of_way = |way: usize| {
+        let angles = disc.angle(way, values);
+        logs.iter().zip(&angles).map(|(log, angle_rad)| log.following(angle_rad)).collect()
+    };
+    Some((effect, (0..disc.angle_rad.len()).map(of_way).collect()))
+}
+
+/// The logs of the first of two ways, with the difference of the two as the error of the sliding speed.
+pub fn known_by(ways: &[Vec<ContactLog>], [best, next]: [usize; 2]) -> Vec<ContactLog> {
+    ways[best].iter().zip(&ways[next]).map(|(log, other)| log.known_as_well_as(other)).collect()
+}
+
+/// What the baseline leaves of these logs with a noise model of its own, N m, and its mean square, (N m)².
+fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64) {
+    let problem = Problem::new(logs, baseline, &[]);
+    let residual_nm: Vec<f64> = {
+        let r = search::baseline(&problem).r;
+        r.iter().zip(&problem.noise.deviation).map(|(r, s)| r * s).collect()
+    };
+    let square = residual_nm.iter().map(|r| r * r).sum::<f64>() / residual_nm.len().max(1) as f64;
+    (residual_nm, square)
+}
+
+/// Coordinates of the contact with their units, all logs on end: what residuals are drawn over.
+pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<f64>)> {
+    let all: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
+    let signal = |of: &dyn Fn(&ContactLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let own = |of: &dyn Fn(&Coordinates) -> Vec<f64>| all.iter().flat_map(of).collect::<Vec<f64>>();
+    vec![
+        ("heat held, J".into(), own(&|c| c.heat_j[1].clone())),
+        ("distance slid, m".into(), own(&|c| c.distance_m.clone())),
+        ("normal force, N".into(), signal(&|log| log.load_n.clone())),
+        ("sliding speed, m/s".into(), signal(&|log| log.root_speed_m_s.clone())),
+        (
+            "disc angle, rad".into(),
+            signal(&|log| log.angle_rad.iter().map(|a| a.rem_euclid(std::f64::consts::TAU)).collect()),
+        ),
+        ("time, s".into(), signal(&|log| log.grid.time_s.clone())),
+    ]
+}

@@ -1,0 +1,234 @@
+//! One table over what the balances found: the hypotheses with their evidence, and which effects could be the model's form.
+
+use super::contact::noise::MODEL_FORM;
+use super::rest::Contribution;
+
+/// A hypothesis has at most so many causes: more are no explanation but a fit, and what they would explain is left as it is.
+pub(super) const MOST_CAUSES: usize = 3;
+/// ln of the prior probability that an effect of the library acts: one in fifty.
+pub const LOG_PRIOR: f64 = -3.9;
+/// Width of the step in ln(size over the model's form) between effects that could be the model's form and real ones.
+const SIZE_WIDTH: f64 = 0.25 / 1.7;
+
+/// Which balance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// Friction torque.
+    Friction,
+    /// Torque of M2, or the force of a stage.
+    Drive,
+    /// Torque of M1.
+    Pressure,
+}
+
+impl Part {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Friction => "friction",
+            Self::Drive => "drive",
+            Self::Pressure => "pressure",
+        }
+    }
+}
+
+/// A set of effects in one balance.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Effects, in alphabetical order.
+    pub effects: Vec<&'static str>,
+    /// ln evidence, the likelihood with its share.
+    pub log_evidence: f64,
+    /// Place in the balance's own list.
+    pub place: usize,
+    /// What each effect does here, in the order of `effects`.
+    pub contributions: Vec<Contribution>,
+    /// Share of its size that each effect's form here may be wrong by, in the order of `effects`.
+    pub forms: Vec<f64>,
+}
+
+/// A hypothesis in the table.
+#[derive(Debug, Clone)]
+pub struct Hypothesis {
+    /// Effects, in alphabetical order.
+    pub effects: Vec<&'static str>,
+    /// ln evidence over all balances, with the prior.
+    pub log_weight: f64,
+    /// Place of the candidate in each part.
+    pub places: Vec<(Part, usize)>,
+    /// Largest change of a prediction by each effect, relative to the signal.
+    pub sizes: Vec<f64>,
+    /// The same over what a change has to exceed.
+    pub over_floor: Vec<f64>,
+    /// Posterior probability.
+    pub probability: f64,
+}
+
+impl Hypothesis {
+    /// ln evidence over all balances, without the prior of its causes.
+    pub fn log_evidence(&self) -> f64 {
+        self.log_weight - LOG_PRIOR * self.effects.len() as f64
+    }
+}
+
+/// An effect that changes less than it would have to.
+#[derive(Debug, Clone, Copy)]
+pub struct TooSmall {
+    /// Its id.
+    pub effect: &'static str,
+    /// What it changes, relative to the signal.
+    pub size: f64,
+    /// What it would have to exceed: the form of the model and of a larger cause beside it.
+    pub floor: f64,
+}
+
+/// Probability that an effect is real that is so many times as large as the form of the model and what is left.
+pub fn real(over_floor: f64) -> f64 {
+    1.0 / (1.0 + (-over_floor.max(1e-9).ln() / SIZE_WIDTH).exp())
+}
+
+fn sorted(mut names: Vec<&'static str>) -> Vec<&'static str> {
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+/// The best candidate that has no effect but these; of each effect its size there.
+fn within<'c>(candidates: &'c [Candidate], effects: &[&str]) -> Option<&'c Candidate> {
+    candidates
+        .iter()
+        .filter(|c| c.effects.iter().all(|e| effects.contains(e)))
+        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+}
+
+/// The table of the balances' candidates, the best hypothesis first, and the effects that are too small for it.
+pub fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall>) {
+    // Sets: one candidate of each part, put together.
+    let mut sets: Vec<Vec<&'static str>> = vec![Vec::new()];
+    for (_, candidates) in parts {
+        let mut next = Vec::new();
+        for set in &sets {
+            for candidate in candidates {
+                let joined = sorted(set.iter().chain(&candidate.effects).copied().collect());
+                if joined.len() <= MOST_CAUSES && !next.contains(&joined) {
+                    next.push(joined);
+                }
+            }
+        }
+        sets = next;
+    }
+    let mut all: Vec<Hypothesis> = sets
+        .into_iter()
+        .filter_map(|effects| {
+            let mut log_weight = LOG_PRIOR * effects.len() as f64;
+            let mut sizes = vec![0.0f64; effects.len()];
+            let mut over_floor = vec![0.0f64; effects.len()];
+            let mut places = Vec::new();
+            for (part, candidates) in parts {
+                let best = within(candidates, &effects)?;
+                log_weight += best.log_evidence;
+                places.push((*part, best.place));
+                for (own, (effect, what)) in best.effects.iter().zip(&best.contributions).enumerate() {
+                    let at = effects.iter().position(|e| e == effect)?;
+                    let others = best
+                        .contributions
+                        .iter()
+                        .zip(&best.forms)
+                        .enumerate()
+                        .filter(|(other, _)| *other != own);
+                    let wrong_by = others.map(|(_, (other, form))| other.size * form).fold(0.0, f64::max);
+                    sizes[at] = sizes[at].max(what.size);
+                    // What a second cause adds may be the first one's form.
+                    let over = what.over_form(MODEL_FORM.max(wrong_by));
+                    over_floor[at] = over_floor[at].max(over);
+                }
+            }
+            Some(Hypothesis { effects, log_weight, places, sizes, over_floor, probability: 0.0 })
+        })
+        .collect();
+    all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    // An effect below what is known is taken out of the table, the smallest first.
+    let mut too_small = Vec::new();
+    while let Some((at, over)) = all.first().and_then(|best| {
+        let below = best.over_floor.iter().copied().enumerate().filter(|(_, over)| *over < 1.0);
+        below.min_by(|a, b| a.1.total_cmp(&b.1))
+    }) {
+        let (effect, size) = (all[0].effects[at], all[0].sizes[at]);
+        too_small.push(TooSmall { effect, size, floor: size / over.max(1e-12) });
+        all.retain(|h| !h.effects.contains(&effect));
+    }
+    let top = all.first().map_or(0.0, |h| h.log_weight);
+    all.iter_mut().for_each(|h| h.probability = (h.log_weight - top).exp());
+    let mass: f64 = all.iter().map(|h| h.probability).sum();
+    all.iter_mut().for_each(|h| h.probability /= mass);
+    hand_down(&mut all);
+    (all, too_small)
+}
+
+/// As far as an effect of a set may be the model's form, the set without it has its probability: the largest sets first.
+fn hand_down(all: &mut [Hypothesis]) {
+    for size in (1..=MOST_CAUSES).rev() {
+        for at in (0..all.len()).filter(|at| all[*at].effects.len() == size).collect::<Vec<_>>() {
+            let doubted = all[at].over_floor.iter().map(|over| 1.0 - real(*over)).enumerate();
+            let Some((effect, doubt)) = doubted.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+            let mut left = all[at].effects.clone();
+            left.remove(effect);
+            if let Some(without) = all.iter().position(|h| h.effects == left) {
+                let handed = doubt * all[at].probability;
+                all[at].probability -= handed;
+                all[without].probability += handed;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::law_form::LAW_FORM;
+
+    #[test]
+    fn a_small_cause_that_leaves_more_than_it_explains_is_a_form() {
+        // Two sets in one balance; the evidence of the second cause is sure.
+        let told = |size: f64, over_rest: f64| {
+            let candidate = |effects: &[&'static str], log_evidence: f64, place: usize| Candidate {
+                effects: effects.to_vec(),
+                log_evidence,
+                place,
+                contributions: [Contribution { size: 0.1, over_rest: 9.0 }, Contribution { size, over_rest }]
+                    [..effects.len()]
+                    .to_vec(),
+                forms: vec![LAW_FORM; effects.len()],
+            };
+            let candidates = vec![candidate(&["a", "b"], 50.0, 0), candidate(&["a"], 0.0, 1)];
+            table(&[(Part::Friction, candidates)]).0[0].clone()
+        };
+        assert_eq!(told(0.02, 3.0).effects, ["a", "b"]);
+        assert!(told(0.02, 3.0).probability > 0.98);
+        // One that leaves nearly twice what it explains: hardly better than even odds.
+        assert!((0.5..0.7).contains(&told(0.02, 0.55).probability));
+        assert_eq!(told(0.02, 0.4).effects, ["a"]);
+        // A large one is none, whatever another cause leaves beside it.
+        assert_eq!(told(0.05, 0.1).effects, ["a", "b"]);
+    }
+
+    #[test]
+    fn what_may_be_a_form_is_the_set_without_it() {
+        let set = |effects: &[&'static str], over_floor: &[f64], probability: f64| Hypothesis {
+            effects: effects.to_vec(),
+            log_weight: 0.0,
+            places: Vec::new(),
+            sizes: vec![0.1; effects.len()],
+            over_floor: over_floor.to_vec(),
+            probability,
+        };
+        // The second cause is as large as the first one's form may be wrong by: even odds, however sure its evidence is.
+        let mut all = [set(&["a", "b"], &[50.0, 1.0], 1.0), set(&["a"], &[50.0], 0.0), set(&[], &[], 0.0)];
+        hand_down(&mut all);
+        let found = all.each_ref().map(|h| h.probability);
+        assert!(
+            (found[0] - 0.5).abs() < 1e-9 && (found[1] - 0.5).abs() < 1e-9 && found[2] < 1e-9,
+            "{found:?}"
+        );
+    }
+}
