@@ -10,12 +10,18 @@ use crate::identify::term::{Parameter, Starts};
 /// The effect.
 pub(super) struct AdcSaturation;
 
+/// The friction channel's ends in the core's law.
+const NAMES: [&str; 2] = ["friction_low_nm", "friction_high_nm"];
+/// An end that no torque reaches, in the core's law, N m.
+const NO_END_NM: f64 = 1e9;
 /// Share of samples that are spikes at most.
 const SPIKES: f64 = 1e-3;
 /// A clipped end holds at least this share of a channel's samples, …
 const LEAST_SHARE: f64 = 0.004;
 /// … within so many deviations of the noise on either side of it.
 const EDGE_NOISES: f64 = 2.5;
+/// A band of values is an end by itself where it holds so many times more than the next: the top of a sine holds 2.4 times more.
+const SHARP: usize = 3;
 /// M1's torque is smoothed over so many samples: the mechanism follows no faster.
 const TORQUE_WIDTH: f64 = 2.0;
 /// The elements touch above this share of the usual load.
@@ -25,17 +31,11 @@ const LINE_WITHIN: f64 = 0.03;
 /// ln of an end's width over the channel's noise: a converter ends within its noise, an amplifier bends before it does.
 const KNEE_WITHIN: f64 = 1.5;
 
-/// The end at which samples of a log pile up: more of them in the last band of values than in the next one below, thrice over.
-/// No log goes beyond it; one that rests just below it says nothing against it.
+/// The end at which samples of a log pile up: more of them in the last band of values than in the next one below, thrice over,
+/// or more at all where another log ends at the same value: two courses have no reason to. No log goes beyond it; one that rests
+/// just below it says nothing against it.
 fn end(logs: &[Vec<f64>], noise: f64) -> Option<f64> {
     let band = 2.0 * EDGE_NOISES * noise;
-    let piled_up = |values: &[f64]| {
-        let n = values.len();
-        let top = top(values)?;
-        let above = |level: f64| n - values.partition_point(|x| *x < level);
-        let (last, two) = (above(top - band), above(top - 2.0 * band));
-        (last as f64 > LEAST_SHARE * n as f64 && last > 3 * (two - last)).then(|| values[n - last / 2 - 1])
-    };
     let sorted: Vec<Vec<f64>> = logs
         .iter()
         .map(|log| {
@@ -44,8 +44,18 @@ fn end(logs: &[Vec<f64>], noise: f64) -> Option<f64> {
             values
         })
         .collect();
-    let highest = sorted.iter().filter_map(|log| top(log)).fold(f64::NEG_INFINITY, f64::max);
-    let ends = sorted.iter().filter_map(|log| piled_up(log)).filter(|end| *end > highest - band);
+    let tops: Vec<f64> = sorted.iter().filter_map(|log| top(log)).collect();
+    let highest = tops.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let piled_up = |values: &Vec<f64>| {
+        let n = values.len();
+        let top = top(values)?;
+        let above = |level: f64| n - values.partition_point(|x| *x < level);
+        let (last, next) = (above(top - band), above(top - 2.0 * band) - above(top - band));
+        let shared = tops.iter().filter(|other| (**other - top).abs() < noise).count() > 1;
+        let more = if shared { last > next } else { last > SHARP * next };
+        (more && last as f64 > LEAST_SHARE * n as f64).then(|| values[n - last / 2 - 1])
+    };
+    let ends = sorted.iter().filter_map(piled_up).filter(|end| *end > highest - band);
     ends.reduce(f64::max)
 }
 
@@ -63,37 +73,55 @@ impl Effect for AdcSaturation {
         }
     }
 
+    fn absent(&self, parameter: &str) -> f64 {
+        if parameter == NAMES[0] { -NO_END_NM } else { NO_END_NM }
+    }
+
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
         self.friction(view).into_iter().chain(self.normal(view)).collect()
     }
 }
 
 impl AdcSaturation {
-    /// The friction channel shows nothing beyond its ends.
-    fn friction(&self, view: &ContactView<'_>) -> Option<ContactTerm> {
-        let of_logs = |sign: f64| -> Vec<Vec<f64>> {
-            view.logs.iter().map(|log| log.friction_nm.iter().map(|x| sign * x).collect()).collect()
-        };
-        let noise = view.logs.iter().map(|log| log.friction_noise_nm).fold(1e-9, f64::max);
+    /// The friction channel shows nothing beyond the ends that the training logs show; of another log any may be asked for.
+    fn friction(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
         let scale = view.scales.torque_nm;
-        let (high, low) = if view.training {
-            (end(&of_logs(1.0), noise), end(&of_logs(-1.0), noise))
-        } else {
-            (Some(scale), Some(scale))
-        };
-        if high.is_none() && low.is_none() {
-            return None;
+        if !view.training {
+            let ends = [[Some(scale); 2], [None, Some(scale)], [Some(scale), None]];
+            return ends.into_iter().filter_map(|ends| self.of_ends(scale, ends)).collect();
         }
-        const FAR: f64 = 1e3;
-        let at = |name: &str, end: Option<f64>| Parameter { reach: 0.05, ..known(name, end.map_or(FAR, |e| e / scale), 0.02) };
-        let parameters = vec![at("high", high), at("low", low)];
-        let start = parameters.iter().map(|p| p.mean).collect();
-        let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
-            change.ends_nm = Some((-p[1] * scale, p[0] * scale));
+        let noise = view.logs.iter().map(|log| log.friction_noise_nm).fold(1e-9, f64::max);
+        let found = [-1.0, 1.0].map(|sign| {
+            let logs: Vec<Vec<f64>> =
+                view.logs.iter().map(|log| log.friction_nm.iter().map(|x| sign * x).collect()).collect();
+            Some(sign * end(&logs, noise)?)
         });
-        Some(term.exported(move |p, _| {
-            vec![("friction_low_nm".into(), -p[1] * scale), ("friction_high_nm".into(), p[0] * scale)]
-        }))
+        self.of_ends(scale, found).into_iter().collect()
+    }
+
+    /// A friction channel with a low and a high end, N m, or one of them.
+    fn of_ends(&self, scale: f64, ends: [Option<f64>; 2]) -> Option<ContactTerm> {
+        let form = match ends {
+            [Some(_), Some(_)] => "both ends",
+            [Some(_), None] => "low end",
+            [None, Some(_)] => "high end",
+            [None, None] => return None,
+        };
+        let named = NAMES.into_iter().zip(ends);
+        let found: Vec<(&str, f64)> = named.filter_map(|(name, end)| Some((name, end? / scale))).collect();
+        let parameters =
+            found.iter().map(|(name, end)| Parameter { reach: 0.05, ..known(name, *end, 0.02) }).collect();
+        let start = found.iter().map(|(_, end)| *end).collect();
+        let names: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
+        let shown = names.clone();
+        let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
+            let end = |name: &str| names.iter().position(|n| *n == name).map(|at| p[at] * scale);
+            let [low, high] = NAMES.map(end);
+            change.ends_nm = Some((low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)));
+        });
+        let export =
+            move |p: &[f64]| shown.iter().zip(p).map(|(name, p)| (name.to_string(), p * scale)).collect();
+        Some(ContactTerm { form, ..term }.exported(move |p, _| export(p)))
     }
 
     /// Where the normal channel is at its upper end, the load is what M1's torque makes it elsewhere.
@@ -168,5 +196,16 @@ mod tests {
         assert!(found.is_some_and(|end| (end - 3.0).abs() < 0.01), "{found:?}");
         // A rest is no end where another log goes beyond it.
         assert_eq!(end(&[swing(4.0, f64::INFINITY), rests], NOISE), None);
+    }
+
+    #[test]
+    fn two_logs_that_end_at_the_same_value_show_it_though_each_rests_below_it() {
+        let rests_below = |end: f64| -> Vec<f64> {
+            let below = white(5_000, 6).iter().map(|e| end - 6.0 * NOISE + NOISE * e).collect::<Vec<_>>();
+            swing(4.0, end).into_iter().chain(below).collect()
+        };
+        let found = end(&[rests_below(3.0), rests_below(3.0)], NOISE);
+        assert!(found.is_some_and(|end| (end - 3.0).abs() < 0.01), "{found:?}");
+        assert_eq!(end(&[rests_below(3.0), rests_below(3.03)], NOISE), None);
     }
 }
