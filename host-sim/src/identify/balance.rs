@@ -69,6 +69,11 @@ pub struct Alternative {
 }
 
 impl Alternative {
+    /// Whether it puts another coupling between motor and disc: there is one.
+    pub fn is_coupling(&self) -> bool {
+        self.disc.is_some() && self.response.is_some()
+    }
+
     /// Columns alone.
     pub fn columns(effect: &'static str, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>) -> Self {
         Self {
@@ -420,7 +425,11 @@ fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize)
             let mut sets: Vec<Vec<usize>> = Vec::new();
             for parent in &parents {
                 for a in 0..alternatives.len() {
-                    if parent.iter().any(|b| alternatives[*b].effect == alternatives[a].effect) {
+                    let excluded = |b: &usize| {
+                        let (a, b) = (&alternatives[a], &alternatives[*b]);
+                        a.effect == b.effect || (a.is_coupling() && b.is_coupling())
+                    };
+                    if parent.iter().any(excluded) {
                         continue;
                     }
                     let mut set = parent.clone();
@@ -517,6 +526,26 @@ mod tests {
         let best: Vec<&str> = found[0].set.iter().map(|a| alternatives[*a].effect).collect();
         assert_eq!(best.len(), 2, "{best:?}");
         assert!((found[0].p[2] - 3.0).abs() < 0.2, "{:?}", found[0].p);
+    }
+
+    #[test]
+    fn motor_and_disc_have_one_coupling() {
+        let wave = |k: f64| -> Vec<f64> { (0..ROWS).map(|i| (k * i as f64).sin()).collect() };
+        let noise = white(ROWS, 2);
+        let of = |((a, b), n): ((f64, f64), &f64)| 9.0 * (a + b) + n;
+        let response: Vec<f64> = wave(0.2).into_iter().zip(wave(0.5)).zip(&noise).map(of).collect();
+        let form = |effect, k: f64, couples: bool| {
+            let columns =
+                Alternative::columns(effect, vec![Parameter::amplitude("size", 30.0)], vec![wave(k)]);
+            let disc = DiscMotion { angle_rad: Vec::new(), angle_per_unit: Vec::new() };
+            let response = couples.then(|| vec![0.0; ROWS]);
+            Alternative { response, disc: Some(disc), ..columns }
+        };
+        let mut balance = balance(response);
+        let best = |balance: &mut Balance, couples| {
+            search_sets(balance, &[form("spring", 0.2, couples), form("play", 0.5, couples)], 2)[0].set.len()
+        };
+        assert_eq!([best(&mut balance, false), best(&mut balance, true)], [2, 1]);
     }
 
     #[test]

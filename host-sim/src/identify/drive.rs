@@ -19,6 +19,10 @@ use crate::input_error::InputError;
 const WIDTHS: [f64; 6] = [1.5, 2.0, 3.0, 4.0, 6.0, 9.0];
 /// Where the angle's noise asks for more than this width, its noise is borne instead, samples.
 const WIDE_ENOUGH: f64 = 4.0;
+/// Widths of a filter that blows of a coupling pass, samples: the narrowest behind which the inertial torque's noise is this share
+/// of the effort at most, since an observer of the disc averages it further.
+const QUICK: [f64; 3] = [1.0, 1.5, 2.0];
+const QUICK_NOISE: f64 = 0.05;
 /// The drive stands where it is slower than this share of its usual speed, …
 const STANDSTILL: f64 = 0.01;
 /// … or than so many deviations of the speed's noise.
@@ -59,6 +63,8 @@ pub struct DriveLog {
     pub speed: Vec<f64>,
     /// Acceleration.
     pub acceleration: Vec<f64>,
+    /// Effort and acceleration as quick as blows of a coupling are.
+    pub quick: [Vec<f64>; 2],
     /// Width of the filter, samples.
     pub width: f64,
     /// Noise of the inertial torque behind the filter.
@@ -100,7 +106,7 @@ impl DriveLog {
     }
 
     #[allow(clippy::too_many_arguments, reason = "one for each signal")]
-    fn made(
+    pub(super) fn made(
         source: String,
         grid: Grid,
         effort: Vec<f64>,
@@ -125,6 +131,12 @@ impl DriveLog {
             (widest, 0.0)
         };
         let dt = grid.step_s;
+        let small = |width: &f64| {
+            inertia * angle_noise * curvature_passed(*width, contact) / (dt * dt) < QUICK_NOISE * rms(&effort)
+        };
+        let quick_width = QUICK.into_iter().find(small).unwrap_or(width).min(width);
+        let quick_acceleration = gaussian(&position, quick_width, 2).iter().map(|d| d / (dt * dt)).collect();
+        let quick = [gaussian(&effort, quick_width, 0), quick_acceleration];
         let speed = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
         let acceleration = gaussian(&position, width, 2).iter().map(|d| d / (dt * dt)).collect();
         Self {
@@ -137,6 +149,7 @@ impl DriveLog {
             usable,
             speed,
             acceleration,
+            quick,
             width,
             inertial_noise,
         }
@@ -330,6 +343,31 @@ mod tests {
             noise(true),
             noise(false)
         );
+    }
+
+    #[test]
+    fn blows_of_a_coupling_pass_the_quick_filter() {
+        // Bursts of 60 Hz, 2 mrad, in counts of 120 000 a turn.
+        let (omega, count) = (std::f64::consts::TAU * 60.0, std::f64::consts::TAU / 120_000.0);
+        let time: Vec<f64> = (0..4000).map(|i| 1e-3 * f64::from(i)).collect();
+        let noise = noise::tests::white(4000, 7);
+        let burst = |t: f64| if t % 1.0 < 0.5 { (omega * t).sin() } else { 0.0 };
+        let angle = |(t, e): (&f64, &f64)| ((-2e-3 * burst(*t) / count) + 0.3 * e).round() * count;
+        let position: Vec<f64> = time.iter().zip(&noise).map(angle).collect();
+        let effort: Vec<f64> = time.iter().map(|t| 2.0 * burst(*t)).collect();
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        let friction = Some(vec![0.0; time.len()]);
+        let log =
+            DriveLog::made("log".into(), grid, effort, position, friction.clone(), friction, usable, 0.01);
+        let [effort, acceleration] = &log.quick;
+        let passed = |values: &[f64], whole: f64| rms(&values[20..480]) * 2f64.sqrt() / whole;
+        let (of_effort, of_acceleration) = (passed(effort, 2.0), passed(acceleration, 2e-3 * omega * omega));
+        assert!(
+            of_effort > 0.7 && (of_effort / of_acceleration - 1.0).abs() < 0.1,
+            "{of_effort} {of_acceleration}"
+        );
+        assert!(passed(&log.acceleration, 2e-3 * omega * omega) < 0.6);
     }
 
     #[test]

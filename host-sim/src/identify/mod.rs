@@ -4,6 +4,7 @@ pub mod balance;
 pub mod command;
 pub mod contact;
 pub mod contact_part;
+pub mod coupling;
 pub mod drive;
 pub mod effects;
 pub mod evidence;

@@ -1,19 +1,18 @@
-//! Motor and disc apart: the disc behind a spring with a dead zone, turned by the measured motion of the motor.
+//! Motor and disc apart: the disc behind a coupling (`coupling.rs`), turned by the measured motion of the motor.
 //!
-//! T_s = k (θ_m − θ_d ∓ gap/2) + d (ω_m − ω_d),   J_d ω̇_d = T_s − T_f,   T2 = J_m ω̇_m + bearing + T_s
+//! J_d ω̇_d = T_s(θ_m − θ_d, ω_m − ω_d) − T_f,   T2 = J_m ω̇_m + bearing + T_s
 //!
 //! θ_m and T_f are measured, so only the disc is integrated; a weak pull towards the torque that the motor's own balance
 //! says is in the shaft keeps it from drifting through the gap, whose crossings are too sensitive to be predicted for long.
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::balance::{Alternative, DiscMotion, Solved};
 use super::contact::problem::FREEDOM;
+use super::coupling::Coupling;
 use super::drive::{DriveLog, INERTIA};
 use super::effects::DriveView;
-use super::evidence::{BALANCE_SHARE, log_occam};
-use super::filters::gaussian;
+use super::evidence::BALANCE_SHARE;
 use super::linear;
 use super::term::Parameter;
 
@@ -27,9 +26,13 @@ const PULL: f64 = 0.1;
 const WEAKER: [f64; 3] = [0.05, 0.015, 0.005];
 /// Pulls with which the disc's motion is reckoned: the friction balance says which of them is best.
 const RECKONED: [f64; 4] = [0.3, 0.1, 0.03, 0.005];
+/// Pull on the disc's speed beside that on its angle, per sample: what the angle is off by was gathered over some sixteen.
+const SPEED_PULL: f64 = 0.06;
 /// No pull is quicker than this share of the mode, which turns by so much in a sample: else the pull would make the torque in
 /// the spring's place, whatever that is of.
 const SLOWER_THAN_MODE: f64 = 0.5;
+/// The torque says where the disc is where the coupling has more than this share of its stiffness.
+const STIFF: f64 = 0.3;
 /// Points of the grid from which a fit starts, its iterations, and step and longest move of the logarithms.
 const STARTS: usize = 3;
 const ITERATIONS: usize = 20;
@@ -37,40 +40,18 @@ const STEP: f64 = 0.01;
 /// The same where there is play: the instants at which it closes make the likelihood rough over less.
 const STEP_OVER_PLAY: f64 = 0.05;
 const REACH: f64 = 0.4;
-/// Modes that the balance's filter lets through, Hz.
-const HERTZ: [f64; 2] = [4.0, 150.0];
-/// From a steel shaft's to one beyond which nothing swings.
-const DAMPING_RATIO: [f64; 2] = [0.003, 1.5];
-/// Neither motor nor disc is all of the inertia.
-const DISC_SHARE: [f64; 2] = [0.1, 0.9];
-/// From the width of some counts of an encoder to a loose key's.
-const GAP_RAD: [f64; 2] = [1e-4, 0.3];
-
 /// Pull with which a coupling is weighed against other causes: it moves the disc no further in a sample than the spring itself
 /// does for the same error, (ω dt)² of it. A stronger one repeats the measurement in the spring's place.
-fn judged(numbers: &TwoMass, log: &DriveLog) -> f64 {
+fn judged(numbers: &Coupling, log: &DriveLog) -> f64 {
     PULL.min((std::f64::consts::TAU * numbers.mode_hz * log.grid.step_s).powi(2))
-}
-
-/// Numbers of a coupling.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TwoMass {
-    /// Frequency of the disc on the spring, the motor held.
-    pub mode_hz: f64,
-    /// Damping ratio of that mode.
-    pub damping_ratio: f64,
-    /// The disc's share of the inertia.
-    pub disc_share: f64,
-    /// Width of the dead zone.
-    pub gap_rad: f64,
 }
 
 /// Shaft torque and angle of the disc for a log.
 fn shaft_torque(
     log: &DriveLog,
-    numbers: &TwoMass,
+    numbers: &Coupling,
     inertia: f64,
-    bearing: &[f64],
+    (bearing, usual_torque): (&[f64], f64),
     pull: f64,
 ) -> (Vec<f64>, Vec<f64>) {
     let n = log.len();
@@ -80,13 +61,14 @@ fn shaft_torque(
     let substeps = (omega * dt / TURN_IN_A_STEP).ceil().max(1.0) as usize;
     let h = dt / substeps as f64;
     let pull = pull.min(SLOWER_THAN_MODE * omega * dt);
-    let (k, d) = (disc * omega * omega, 2.0 * numbers.damping_ratio * disc * omega);
-    let half = 0.5 * numbers.gap_rad;
+    let law = numbers.law(disc, usual_torque);
+    let k = law.stiffness;
     let free = vec![0.0; n];
     let friction = log.friction.as_ref().unwrap_or(&free);
-    let observed: Vec<f64> = gaussian(&log.effort, 1.0, 0)
+    let [effort, acceleration] = &log.quick;
+    let observed: Vec<f64> = effort
         .iter()
-        .zip(&log.acceleration)
+        .zip(acceleration)
         .zip(bearing)
         .map(|((t, a), b)| t - (inertia - disc) * a - b)
         .collect();
@@ -101,37 +83,27 @@ fn shaft_torque(
             ((x[i] - x[i - 1]) / dt, if i + 1 < n { (x[i + 1] - x[i]) / dt } else { (x[i] - x[i - 1]) / dt });
         let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
         let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
-        let torque = |twist: f64, rate: f64| {
-            if twist > half {
-                (k * (twist - half) + d * rate).max(if half > 0.0 { 0.0 } else { f64::NEG_INFINITY })
-            } else if twist < -half {
-                (k * (twist + half) + d * rate).min(if half > 0.0 { 0.0 } else { f64::INFINITY })
-            } else if half > 0.0 {
-                0.0
-            } else {
-                k * twist + d * rate
-            }
-        };
         for s in 0..substeps {
             // Drift, kick, drift: motor and disc are seen at the same instant, in the middle of the step.
             let part = (s as f64 + 0.5) / substeps as f64;
-            let motor = x[i - 1] + dt * part * (va + 0.5 * (vb - va) * part);
+            let (motor, rate) = between([x[i - 1], x[i]], [dt * va, dt * vb], part);
             q += 0.5 * h * w;
-            let shaft = torque(motor - q, va + (vb - va) * part - w);
+            let shaft = law.torque(motor - q, rate / dt - w);
             w += h * (shaft - (friction[i - 1] + (friction[i] - friction[i - 1]) * part)) / disc;
             q += 0.5 * h * w;
         }
-        out[i] = torque(x[i] - q, vb - w);
+        let twist = x[i] - q;
+        out[i] = law.torque(twist, vb - w);
         // In the gap the torque does not say where the disc is, but that it is at the other end where the motor says so.
-        let off = if out[i] != 0.0 {
+        let off = if law.slope(twist) > STIFF {
             (out[i] - observed[i]) / k
         } else if observed[i].abs() > sure {
-            x[i] - observed[i] / k - observed[i].signum() * half - q
+            twist - observed[i] / k - observed[i].signum() * law.half_gap
         } else {
             0.0
         };
         q += pull * off;
-        w += 0.06 * pull * off / dt;
+        w += SPEED_PULL * pull * off / dt;
         if !q.is_finite() || !w.is_finite() || q.abs() > 1e9 {
             return (vec![f64::NAN; n], disc_position);
         }
@@ -140,26 +112,29 @@ fn shaft_torque(
     (out, disc_position)
 }
 
+/// Hermite's cubic between two samples, with the slopes there, and its slope.
+fn between([x0, x1]: [f64; 2], [m0, m1]: [f64; 2], part: f64) -> (f64, f64) {
+    let bow = m0 + m1 - 2.0 * (x1 - x0);
+    let turn = 3.0 * (x1 - x0) - 2.0 * m0 - m1;
+    (x0 + part * (m0 + part * (turn + part * bow)), m0 + part * (2.0 * turn + 3.0 * part * bow))
+}
+
 fn alternative(
     effect: &'static str,
     view: &DriveView<'_>,
-    numbers: &TwoMass,
+    numbers: &Coupling,
     bearing: &[f64],
     pull: f64,
 ) -> Option<Alternative> {
     let n = numbers;
-    let within = |[low, high]: [f64; 2], value: f64| (low..high).contains(&value);
-    let allowed = within(HERTZ, n.mode_hz)
-        && within(DAMPING_RATIO, n.damping_ratio)
-        && within(DISC_SHARE, n.disc_share)
-        && (n.gap_rad == 0.0 || within(GAP_RAD, n.gap_rad));
-    if !allowed {
+    if !n.is_allowed() {
         return None;
     }
     let mut added = Vec::with_capacity(view.balance.response.len());
     let mut from = 0;
     for log in view.logs {
-        let (torque, _) = shaft_torque(log, numbers, view.inertia, &bearing[from..from + log.len()], pull);
+        let own = (&bearing[from..from + log.len()], view.scales.effort);
+        let (torque, _) = shaft_torque(log, numbers, view.inertia, own, pull);
         from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
@@ -173,94 +148,114 @@ fn alternative(
         }
         added.extend(log.filtered(&change));
     }
-    let disc = numbers.disc_share * view.inertia;
-    let omega = std::f64::consts::TAU * numbers.mode_hz;
-    let mut constants = vec![
-        ("stiffness_nm_per_rad".to_string(), disc * omega * omega),
-        ("damping_nm_s_per_rad".to_string(), 2.0 * numbers.damping_ratio * disc * omega),
-        ("disc_inertia_kg_m2".to_string(), disc),
-        ("mode_hz".to_string(), numbers.mode_hz),
-    ];
-    if numbers.gap_rad > 0.0 {
-        constants.push(("gap_rad".to_string(), numbers.gap_rad));
-    }
+    let disc = n.disc_share * view.inertia;
     Some(Alternative {
-        form: format!("{:.0} Hz, gap {:.2e} rad", numbers.mode_hz, numbers.gap_rad),
+        form: n.words(),
         response: Some(added),
         disc: Some(DiscMotion { angle_rad: Vec::new(), angle_per_unit: Vec::new() }),
         base_shift: vec![(INERTIA, -disc)],
-        constants,
+        constants: n.constants(disc, view.scales.effort),
         ..Alternative::columns(effect, Vec::<Parameter>::new(), Vec::new())
     })
 }
 
-/// The best shape of a coupling: a coarse grid, then a fit from its best points.
-pub fn alternative_of_grid(
+/// The best shapes of a coupling, the plain one and one that bends (a spring that hardens, play with rounded ends): a coarse
+/// grid, then a fit from its best points.
+pub fn alternatives_of_grid(
     effect: &'static str,
     view: &DriveView<'_>,
-    grid: Vec<TwoMass>,
-) -> Option<Alternative> {
-    if !view.rotary || view.inertia <= 0.0 {
-        return None;
+    grid: Vec<Coupling>,
+) -> Vec<Alternative> {
+    // There is one coupling.
+    let coupled = view.company.forms.iter().any(|form| form.is_coupling());
+    if !view.rotary || view.inertia <= 0.0 || coupled {
+        return Vec::new();
     }
-    if let Some(fixed) = view.fixed {
-        let get = |name: &str| fixed.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
-        let (disc, k, mode_hz) = (get("disc_inertia_kg_m2"), get("stiffness_nm_per_rad"), get("mode_hz"));
-        let damping_ratio = get("damping_nm_s_per_rad") * std::f64::consts::PI * mode_hz / k.max(1e-12);
-        let numbers =
-            TwoMass { mode_hz, damping_ratio, disc_share: disc / view.inertia, gap_rad: get("gap_rad") };
-        let bearing = view.balance.bearing(&[]);
-        return alternative(effect, view, &numbers, &bearing, judged(&numbers, &view.logs[0]))
-            .map(|form| reckoned(view, &numbers, &bearing, form));
-    }
-    let trial = |numbers: &TwoMass, bearing: &[f64], pull: f64| -> Option<Trial> {
+    let found = match view.fixed {
+        Some(fixed) => [of_constants(effect, view, fixed), None],
+        None => searched(effect, view, &grid),
+    };
+    found.into_iter().flatten().collect()
+}
+
+/// The coupling with the numbers that were found on other logs.
+fn of_constants(effect: &'static str, view: &DriveView<'_>, fixed: &[(String, f64)]) -> Option<Alternative> {
+    let numbers = Coupling::of_constants(fixed, view.inertia, view.scales.effort);
+    let bearing = view.balance.bearing(&[]);
+    let form = alternative(effect, view, &numbers, &bearing, judged(&numbers, &view.logs[0]))?;
+    Some(reckoned(view, &numbers, &bearing, form))
+}
+
+/// The best plain coupling of a grid, and the best one that bends.
+fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> [Option<Alternative>; 2] {
+    let trial = |numbers: &Coupling, bearing: &[f64], pull: f64| -> Option<Trial> {
         let alternative = alternative(effect, view, numbers, bearing, pull)?;
         let solved = view.balance.solve_forms(&joined(view, &alternative));
         Some(Trial { numbers: *numbers, alternative, solved })
     };
-    let bearing = view.balance.bearing(view.company.forms);
-    let mut tried: Vec<Trial> =
-        grid.par_iter().filter_map(|numbers| trial(numbers, &bearing, PULL)).collect();
-    tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
-    // Of each width the best, so that the fits do not all start in one valley.
-    let mut widths: Vec<f64> = Vec::new();
-    tried.retain(|t| {
-        let new = t.numbers.gap_rad == 0.0 || !widths.contains(&t.numbers.gap_rad);
-        widths.push(t.numbers.gap_rad);
-        new
-    });
-    tried.truncate(STARTS);
     let refined_by = |start: Trial, bearing: &[f64], pull: f64| {
-        refined(view, start, &|numbers: &TwoMass| trial(numbers, bearing, pull))
+        refined(view, start, &|numbers: &Coupling| trial(numbers, bearing, pull))
     };
-    let of_starts = tried.into_iter().filter_map(|start| refined_by(start, &bearing, PULL));
-    let best = of_starts.max_by(|(a, of_a), (b, of_b)| {
-        (a.solved.log_evidence + of_a).total_cmp(&(b.solved.log_evidence + of_b))
-    });
-    let (best, mut log_prior) = best?;
-    let bearing = view.balance.bearing(&joined(view, &best.alternative));
-    let mut numbers = best.numbers;
-    if numbers.gap_rad == 0.0 {
-        for pull in WEAKER {
-            let Some((better, occam)) =
-                trial(&numbers, &bearing, pull).and_then(|t| refined_by(t, &bearing, pull))
-            else {
-                break;
-            };
-            (numbers, log_prior) = (better.numbers, occam);
+    let better = |a: (Trial, f64), b: (Trial, f64)| {
+        if a.0.solved.log_evidence + a.1 < b.0.solved.log_evidence + b.1 { b } else { a }
+    };
+    let best_of = |starts: Vec<Trial>, bearing: &[f64]| -> Option<(Trial, f64)> {
+        starts.into_iter().filter_map(|start| refined_by(start, bearing, PULL)).reduce(better)
+    };
+    let made = |(best, log_prior): (Trial, f64), bearing: &[f64]| -> Option<Alternative> {
+        let numbers = &best.numbers;
+        let found = alternative(effect, view, numbers, bearing, judged(numbers, &view.logs[0]))?;
+        Some(Alternative { log_prior, ..reckoned(view, numbers, bearing, found) })
+    };
+    let sharpened = |mut best: (Trial, f64)| -> Option<Alternative> {
+        let bearing = view.balance.bearing(&joined(view, &best.0.alternative));
+        let weaker = if best.0.numbers.gap_rad > 0.0 { &[][..] } else { &WEAKER };
+        for pull in weaker {
+            let start = trial(&best.0.numbers, &bearing, *pull);
+            let Some(better) = start.and_then(|start| refined_by(start, &bearing, *pull)) else { break };
+            best = better;
         }
+        made(best, &bearing)
+    };
+    let bearing = view.balance.bearing(view.company.forms);
+    let starts = |bends: bool| -> Vec<Trial> {
+        let of = |numbers: &Coupling| trial(&if bends { numbers.bent() } else { *numbers }, &bearing, PULL);
+        let mut tried: Vec<Trial> = grid.par_iter().filter_map(of).collect();
+        tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
+        // Of each width the best, so that the fits do not all start in one valley.
+        let mut widths: Vec<f64> = Vec::new();
+        tried.retain(|t| {
+            let new = t.numbers.gap_rad == 0.0 || !widths.contains(&t.numbers.gap_rad);
+            widths.push(t.numbers.gap_rad);
+            new
+        });
+        tried.truncate(STARTS);
+        tried
+    };
+    let Some(plain) = best_of(starts(false), &bearing) else { return [None, None] };
+    let nothing = view.balance.solve_forms(view.company.forms).log_evidence;
+    if plain.0.solved.log_evidence + plain.1 < nothing {
+        // Where nothing asks for a coupling, its numbers are of no account.
+        return [made(plain, &bearing), None];
     }
-    let found = alternative(effect, view, &numbers, &bearing, judged(&numbers, &view.logs[0]))?;
-    Some(Alternative { log_prior, ..reckoned(view, &numbers, &bearing, found) })
+    let bent = best_of(starts(true), &bearing);
+    // Over the edge of a dead zone the likelihood is rough, and over a rounded one it is not: what was found there is a start too.
+    let unbent = bent.as_ref().and_then(|(bent, _)| {
+        let start = trial(&Coupling { bend: 0.0, ..bent.numbers }, &bearing, PULL)?;
+        best_of(vec![start], &bearing)
+    });
+    let plain = unbent.into_iter().fold(plain, better);
+    [sharpened(plain), bent.and_then(sharpened)]
 }
 
 /// With the disc's motion in each way.
-fn reckoned(view: &DriveView<'_>, numbers: &TwoMass, bearing: &[f64], mut form: Alternative) -> Alternative {
+fn reckoned(view: &DriveView<'_>, numbers: &Coupling, bearing: &[f64], mut form: Alternative) -> Alternative {
     let starts = view.logs.iter().scan(0, |from, log| Some(std::mem::replace(from, *from + log.len())));
     let logs: Vec<(&DriveLog, usize)> = view.logs.iter().zip(starts).collect();
     let angles = |pull: f64| -> Vec<Vec<f64>> {
         let of = |(log, from): &(&DriveLog, usize)| {
-            shaft_torque(log, numbers, view.inertia, &bearing[*from..*from + log.len()], pull).1
+            let own = (&bearing[*from..*from + log.len()], view.scales.effort);
+            shaft_torque(log, numbers, view.inertia, own, pull).1
         };
         logs.iter().map(of).collect()
     };
@@ -277,33 +272,9 @@ fn joined<'a>(view: &'a DriveView<'_>, form: &'a Alternative) -> Vec<&'a Alterna
 
 /// A coupling with what the balance makes of it.
 struct Trial {
-    numbers: TwoMass,
+    numbers: Coupling,
     alternative: Alternative,
     solved: Solved,
-}
-
-impl TwoMass {
-    /// What is fitted: logarithms, so that a step is a ratio.
-    fn logarithms(&self) -> Vec<f64> {
-        let n = [self.mode_hz, self.damping_ratio, self.disc_share, self.gap_rad];
-        n.iter().take(if self.gap_rad > 0.0 { 4 } else { 3 }).map(|n| n.ln()).collect()
-    }
-
-    fn of_logarithms(p: &[f64]) -> Self {
-        Self {
-            mode_hz: p[0].exp(),
-            damping_ratio: p[1].exp(),
-            disc_share: p[2].exp(),
-            gap_rad: p.get(3).map_or(0.0, |gap| gap.exp()),
-        }
-    }
-}
-
-/// Occam's factor of the numbers, as a logarithm: their logarithms are equally likely between the ends, which is told by a
-/// normal prior of the same deviation.
-fn occam(curvature: &DMatrix<f64>) -> f64 {
-    let sd = [HERTZ, DAMPING_RATIO, DISC_SHARE, GAP_RAD].map(|[low, high]| (high / low).ln() / 12f64.sqrt());
-    log_occam(curvature, BALANCE_SHARE, &sd[..curvature.nrows()])
 }
 
 /// Gauss–Newton with damping on the logarithms; the base parameters are solved for each trial (variable projection). With
@@ -311,7 +282,7 @@ fn occam(curvature: &DMatrix<f64>) -> f64 {
 fn refined(
     view: &DriveView<'_>,
     start: Trial,
-    trial: &(dyn Fn(&TwoMass) -> Option<Trial> + Sync),
+    trial: &(dyn Fn(&Coupling) -> Option<Trial> + Sync),
 ) -> Option<(Trial, f64)> {
     let balance = view.balance;
     let scaled = |solved: &Solved| -> Vec<f64> {
@@ -322,7 +293,7 @@ fn refined(
     let mut log_occam = None;
     let mut damping = 1e-2;
     for _ in 0..ITERATIONS {
-        let p = best.numbers.logarithms();
+        let p = best.numbers.fitted();
         let r = scaled(&best.solved);
         let columns: Option<Vec<Vec<f64>>> = (0..p.len())
             .into_par_iter()
@@ -330,7 +301,7 @@ fn refined(
                 let moved = |step: f64| {
                     let mut q = p.clone();
                     q[i] += step;
-                    let there = trial(&TwoMass::of_logarithms(&q))?;
+                    let there = trial(&best.numbers.with(&q))?;
                     Some(scaled(&there.solved).iter().zip(&r).map(|(a, b)| (b - a) / step).collect())
                 };
                 // At the end of what is allowed the other way.
@@ -341,7 +312,7 @@ fn refined(
         let weights: Vec<f64> =
             r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
         let (h, g) = linear::normal_equations(&columns, &weights, &r);
-        log_occam = Some(occam(&h));
+        log_occam = Some(best.numbers.log_occam(&h));
         let mut better = None;
         for _ in 0..4 {
             let mut damped = h.clone();
@@ -351,7 +322,7 @@ fn refined(
             let d = linear::factor(&damped).solve(&g);
             let excess = d.amax().max(REACH) / REACH;
             let q: Vec<f64> = p.iter().zip(d.iter()).map(|(p, d)| p + d / excess).collect();
-            let there = trial(&TwoMass::of_logarithms(&q));
+            let there = trial(&best.numbers.with(&q));
             better = there.filter(|t| t.solved.log_evidence > best.solved.log_evidence);
             if better.is_some() {
                 break;
@@ -368,4 +339,111 @@ fn refined(
         }
     }
     Some((best, log_occam?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::balance::Company;
+    use crate::identify::drive::{self, DrivePrior, DriveScales};
+    use crate::identify::grid::Grid;
+    use crate::identify::noise::tests::white;
+
+    const INERTIA_KG_M2: f64 = 0.018;
+    const DISC_KG_M2: f64 = 0.011;
+    const STEPS_PER_SAMPLE: usize = 40;
+
+    /// A lifted disc that swings behind a coupling under a torque of three sines, the angle in counts of 120 000 a turn.
+    fn log(torque: impl Fn(f64, f64) -> f64) -> DriveLog {
+        let h = 1e-3 / STEPS_PER_SAMPLE as f64;
+        let (mut motor, mut disc) = ([0.0f64; 2], [0.0f64; 2]);
+        let noise = white(8000, 3);
+        let (mut time, mut effort, mut position, mut friction) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let count = std::f64::consts::TAU / 120_000.0;
+        for i in 0..8000 * STEPS_PER_SAMPLE {
+            let t = h * i as f64;
+            let swing = 2.0 * (4.0 * t).sin() + 1.5 * (11.0 * t).sin() + (23.0 * t).sin();
+            let driven = if t % 2.0 < 1.3 { swing } else { 0.0 };
+            if i % STEPS_PER_SAMPLE == 0 {
+                time.push(t);
+                effort.push(driven + 0.01 * noise[i / STEPS_PER_SAMPLE]);
+                position.push((motor[0] / count).round() * count);
+                friction.push((disc[1] / 0.3).tanh() + 0.01 * noise[7999 - i / STEPS_PER_SAMPLE]);
+            }
+            let shaft = torque(motor[0] - disc[0], motor[1] - disc[1]);
+            motor[1] += h * (driven - 0.02 * motor[1] - shaft) / (INERTIA_KG_M2 - DISC_KG_M2);
+            let rubbed = 1.0 * (disc[1] / 0.3).tanh();
+            disc[1] += h * (shaft - rubbed) / DISC_KG_M2;
+            motor[0] += h * motor[1];
+            disc[0] += h * disc[1];
+        }
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        let load = vec![30.0; time.len()];
+        DriveLog::made(
+            "log".into(),
+            grid,
+            effort,
+            position,
+            Some(friction),
+            Some(load),
+            usable,
+            INERTIA_KG_M2,
+        )
+    }
+
+    /// Numbers of the better one of the two forms.
+    fn found(effect: &'static str, log: DriveLog, grid: &[Coupling]) -> Vec<(String, f64)> {
+        let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
+        let logs = [log];
+        let scales = DriveScales::new(&logs);
+        let balance = drive::balance(&logs, &nothing, &scales);
+        let residual = balance.solve(&[], &[]).residual;
+        let company = Company { forms: &[], residual: &residual };
+        let view = DriveView {
+            logs: &logs,
+            scales: &scales,
+            balance: &balance,
+            company,
+            rotary: true,
+            inertia: INERTIA_KG_M2,
+            fixed: None,
+        };
+        let forms = searched(effect, &view, grid).into_iter().flatten();
+        let best = forms.max_by(|a, b| {
+            let evidence = |form: &Alternative| balance.solve_forms(&[form]).log_evidence;
+            evidence(a).total_cmp(&evidence(b))
+        });
+        best.expect("a form").constants
+    }
+
+    fn assert_near(constants: &[(String, f64)], name: &str, truth: f64, within: f64) {
+        let value = constants.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
+        assert!((value / truth - 1.0).abs() < within, "{name}: {value} for {truth}; {constants:?}");
+    }
+
+    #[test]
+    fn a_spring_that_hardens_is_found_with_its_hardening() {
+        let (k, beta, d) = (200.0, 1200.0, 0.1);
+        let log = log(|twist, rate| k * twist * (1.0 + beta * twist * twist) + d * rate);
+        let grid = [Coupling::spring(17.0, 0.03, 0.65), Coupling::spring(34.0, 0.03, 0.65)];
+        let found = found("shaft_torsion", log, &grid);
+        assert_near(&found, "stiffness_nm_per_rad", k, 0.03);
+        assert_near(&found, "hardening_per_rad2", beta, 0.15);
+    }
+
+    #[test]
+    fn play_is_found_with_its_width() {
+        let (k, gap, d) = (1100.0, 0.02, 0.5);
+        let log = log(|twist: f64, rate| {
+            let overlap = (twist.abs() - 0.5 * gap).max(0.0) * twist.signum();
+            let carried = k * overlap + d * rate;
+            if overlap * carried > 0.0 { carried } else { 0.0 }
+        });
+        let of = |gap_rad| Coupling { gap_rad, ..Coupling::spring(48.0, 0.05, 0.55) };
+        let found = found("backlash", log, &[0.006, 0.012, 0.025, 0.05].map(of));
+        // Stiffness and damping of blows that last some samples are not.
+        assert_near(&found, "gap_rad", gap, 0.1);
+    }
 }

@@ -2,7 +2,8 @@
 
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
-use crate::identify::two_mass::{TwoMass, alternative_of_grid};
+use crate::identify::coupling::Coupling;
+use crate::identify::two_mass::alternatives_of_grid;
 
 /// The effect.
 pub(super) struct Backlash;
@@ -21,11 +22,11 @@ impl Effect for Backlash {
         for mode_hz in [34.0, 48.0, 68.0] {
             for disc_share in [0.35, 0.55, 0.75] {
                 for damping_ratio in [0.05, 0.2] {
-                    let of_gap = |gap_rad| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad };
+                    let of_gap = |gap_rad| Coupling { gap_rad, ..Coupling::spring(mode_hz, damping_ratio, disc_share) };
                     grid.extend([0.003, 0.006, 0.012, 0.025, 0.05, 0.1].map(of_gap));
                 }
             }
         }
-        alternative_of_grid("backlash", view, grid).into_iter().collect()
+        alternatives_of_grid("backlash", view, grid)
     }
 }

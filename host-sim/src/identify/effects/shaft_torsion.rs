@@ -2,7 +2,8 @@
 
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
-use crate::identify::two_mass::{TwoMass, alternative_of_grid};
+use crate::identify::coupling::Coupling;
+use crate::identify::two_mass::alternatives_of_grid;
 
 /// The effect.
 pub(super) struct ShaftTorsion;
@@ -19,9 +20,9 @@ impl Effect for ShaftTorsion {
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let grid = [12.0, 17.0, 24.0, 34.0, 48.0, 68.0].into_iter().flat_map(|mode_hz| {
             [0.03, 0.15].into_iter().flat_map(move |damping_ratio| {
-                [0.35, 0.65].map(|disc_share| TwoMass { mode_hz, damping_ratio, disc_share, gap_rad: 0.0 })
+                [0.35, 0.65].map(|disc_share| Coupling::spring(mode_hz, damping_ratio, disc_share))
             })
         });
-        alternative_of_grid("shaft_torsion", view, grid.collect()).into_iter().collect()
+        alternatives_of_grid("shaft_torsion", view, grid.collect())
     }
 }
