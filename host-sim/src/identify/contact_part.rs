@@ -104,28 +104,18 @@ impl ContactPart {
 
     /// The sets found, for the table.
     pub fn candidates(&self) -> Vec<Candidate> {
-        let mut out = Vec::new();
-        for (place, (ranked, contributions)) in self.ranked.iter().zip(&self.contributions).enumerate() {
-            let fit = &ranked.fit;
-            // A sum of columns finds its shape, a law has one.
-            let of_term = |term: &usize| {
-                let term = &self.terms[*term];
-                let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
-                (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
-            };
-            let terms = fit.terms.iter().map(of_term).zip(contributions);
-            let mut effects: Vec<(&'static str, f64, Contribution)> =
-                terms.map(|((effect, form), own)| (effect, form, *own)).collect();
-            effects.sort_by_key(|e| e.0);
-            out.push(Candidate {
-                effects: effects.iter().map(|e| e.0).collect(),
-                log_evidence: ranked.log_evidence,
-                place,
-                contributions: effects.iter().map(|e| e.2).collect(),
-                forms: effects.iter().map(|e| e.1).collect(),
-            });
-        }
-        out
+        // A sum of columns finds its shape, a law has one.
+        let of_term = |term: &usize| {
+            let term = &self.terms[*term];
+            let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
+            (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
+        };
+        let of_set = |(place, (ranked, contributions)): (usize, (&search::Ranked, &Vec<Contribution>))| {
+            let terms = ranked.fit.terms.iter().map(of_term).zip(contributions);
+            let effects = terms.map(|((effect, form), own)| (effect, form, *own));
+            Candidate::new(place, ranked.log_evidence, effects)
+        };
+        self.ranked.iter().zip(&self.contributions).enumerate().map(of_set).collect()
     }
 }
 

@@ -43,8 +43,14 @@ pub struct Coupling {
     pub bend: f64,
 }
 
-/// Torque over the twist.
+/// Torque over the twist, and what it acts between.
 pub struct Law {
+    /// Inertia of the motor.
+    pub motor_inertia: f64,
+    /// Inertia of the disc.
+    pub disc_inertia: f64,
+    /// Frequency of the disc on the spring, the motor held, rad/s.
+    pub omega_rad_s: f64,
     /// k.
     pub stiffness: f64,
     /// b.
@@ -95,13 +101,17 @@ impl Coupling {
         Self { bend: FIRST_BEND, ..*self }
     }
 
-    /// Its law in front of a disc of this inertia.
-    pub fn law(&self, disc_inertia: f64, usual_torque: f64) -> Law {
+    /// Its law where motor and disc have this inertia together.
+    pub fn law(&self, inertia: f64, usual_torque: f64) -> Law {
         let omega = TAU * self.mode_hz;
+        let disc_inertia = self.disc_share * inertia;
         let stiffness = disc_inertia * omega * omega;
         let half_gap = 0.5 * self.gap_rad;
         let hardening = if self.gap_rad > 0.0 { 0.0 } else { self.bend };
         Law {
+            motor_inertia: inertia - disc_inertia,
+            disc_inertia,
+            omega_rad_s: omega,
             stiffness,
             half_gap,
             damping: 2.0 * self.damping_ratio * disc_inertia * omega,
@@ -126,12 +136,11 @@ impl Coupling {
     }
 
     /// Its law's numbers, with their names.
-    pub fn constants(&self, disc_inertia: f64, usual_torque: f64) -> Vec<(String, f64)> {
-        let law = self.law(disc_inertia, usual_torque);
+    pub fn constants(&self, law: &Law) -> Vec<(String, f64)> {
         let always = [
             ("stiffness_nm_per_rad", law.stiffness),
             ("damping_nm_s_per_rad", law.damping),
-            ("disc_inertia_kg_m2", disc_inertia),
+            ("disc_inertia_kg_m2", law.disc_inertia),
             ("mode_hz", self.mode_hz),
         ];
         let own = [
@@ -208,7 +217,7 @@ mod tests {
         for coupling in
             [Coupling::spring(20.0, 0.1, 0.5), Coupling::spring(20.0, 0.1, 0.5).bent(), play(0.0), play(0.7)]
         {
-            let constants = coupling.constants(0.6 * coupling.disc_share, USUAL_NM);
+            let constants = coupling.constants(&coupling.law(0.6, USUAL_NM));
             let told = Coupling::of_constants(&constants, 0.6, USUAL_NM);
             let (told, own) = (told.fitted(), coupling.fitted());
             assert_eq!(told.len(), own.len());
@@ -220,7 +229,7 @@ mod tests {
     #[test]
     fn a_spring_that_hardens_takes_its_bend_more_at_the_usual_torque() {
         let spring = Coupling { bend: 0.3, ..Coupling::spring(20.0, 0.1, 0.5) };
-        let law = spring.law(0.01, USUAL_NM);
+        let law = spring.law(0.02, USUAL_NM);
         let twist = USUAL_NM / law.stiffness;
         assert!((law.torque(twist, 0.0) - 1.3 * USUAL_NM).abs() < 1e-9);
         assert!((law.torque(-twist, 0.0) + 1.3 * USUAL_NM).abs() < 1e-9);
@@ -228,7 +237,7 @@ mod tests {
 
     #[test]
     fn rounded_play_is_the_dead_zone_far_from_its_ends_and_its_slope_is_that_of_its_overlap() {
-        let [sharp, round] = [play(0.0), play(0.2)].map(|coupling| coupling.law(0.01, USUAL_NM));
+        let [sharp, round] = [play(0.0), play(0.2)].map(|coupling| coupling.law(0.02, USUAL_NM));
         assert_eq!([sharp.torque(0.009, 1.0), sharp.torque(-0.009, -1.0)], [0.0, 0.0]);
         assert!((sharp.torque(0.03, 0.0) - 0.02 * sharp.stiffness).abs() < 1e-9);
         assert!((round.torque(0.2, 0.0) / sharp.torque(0.2, 0.0) - 1.0).abs() < 1e-3);

@@ -231,8 +231,8 @@ pub fn direction(log: &DriveLog, usual_speed: f64) -> Vec<f64> {
     log.filtered(&sign)
 }
 
-/// What is known of the drive beforehand.
-#[derive(Debug, Clone, Copy)]
+/// What is known of the drive beforehand: nothing by default.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct DrivePrior {
     /// Inertia or mass, and whether the rig file says it.
     pub inertia: Option<f64>,
@@ -379,9 +379,8 @@ mod tests {
         let grid = Grid::new(&time);
         let usable = grid.covered.clone();
         let log = DriveLog::made("log".into(), grid, effort, position, None, None, usable, 0.0);
-        let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
         let scales = DriveScales::new(std::slice::from_ref(&log));
-        let p = balance(&[log], &nothing, &scales).solve(&[], &[]).p;
+        let p = balance(&[log], &DrivePrior::default(), &scales).solve(&[], &[]).p;
         assert!(p[COULOMB + 1] >= 0.0, "{p:?}");
     }
 }

@@ -13,12 +13,11 @@ use super::contact::log::ContactLog;
 use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
 use super::contact_part::ContactPart;
-use super::effects::LIBRARY;
 use super::fit_contact::{self, Begin};
 use super::judge::Judgement;
 use super::linear_part::Linear;
 use super::table::Part;
-use super::{fit_interval, fit_parameters};
+use super::{effects, fit_interval, fit_parameters};
 use crate::files::log::Log;
 use crate::files::model_file::{Extension, ModelFile, ModelKind};
 use crate::files::number;
@@ -113,9 +112,7 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
         let core = CoreExtension::with_id(term.effect).map(CoreExtension::names).unwrap_or_default();
         // A form of which the core has nothing is told, and not predicted.
         if term.export.is_some() && core.iter().any(|name| exported.contains_key(*name)) {
-            let absent = |name: &str| {
-                LIBRARY.iter().find(|e| e.id() == term.effect).map_or(0.0, |effect| effect.absent(name))
-            };
+            let absent = |name: &str| effects::with_id(term.effect).map_or(0.0, |effect| effect.absent(name));
             let value = |name: &str| exported.get(name).map_or_else(|| absent(name), |v| v.value);
             let parameters = core.iter().map(|name| ((*name).to_string(), value(name))).collect();
             extensions.push(Extension { id: term.effect.into(), parameters });

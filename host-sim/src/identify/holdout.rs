@@ -9,7 +9,7 @@ use super::contact::log::ContactLog;
 use super::contact::problem::Problem;
 use super::contact_part::{self, ContactPart};
 use super::drive::{self, DriveLog, DriveScales};
-use super::effects::{DriveView, LIBRARY, NormalLoadView};
+use super::effects::{self, DriveView, NormalLoadView};
 use super::judge::Judgement;
 use super::linear_part::{self, Linear};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
@@ -317,8 +317,7 @@ fn drive_alternatives(
     logs: &[DriveLog],
     rig: Option<&RigFile>,
 ) -> (Balance, Vec<Alternative>) {
-    let nothing = drive::DrivePrior { inertia: None, coulomb: None, viscous: None };
-    let prior = rig.map_or(nothing, linear_part::drive_prior);
+    let prior = rig.map(linear_part::drive_prior).unwrap_or_default();
     let scales = DriveScales::new(logs);
     let balance = drive::balance(logs, &prior, &scales);
     let solved = &part.solved[found.place(Part::Drive).unwrap_or(0)];
@@ -342,7 +341,7 @@ fn drive_alternatives(
             inertia: none.p[drive::INERTIA],
             fixed: Some(&own.constants),
         };
-        fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.drive(&view)));
+        fixed.extend(effects::with_id(own.effect).into_iter().flat_map(|e| e.drive(&view)));
     }
     (balance, fixed)
 }
@@ -380,7 +379,7 @@ fn normal_load_errors(
             company: Company { forms: &[], residual: &balance.response },
             fixed: Some(&own.constants),
         };
-        fixed.extend(LIBRARY.iter().filter(|e| e.id() == own.effect).flat_map(|e| e.normal_load(&view)));
+        fixed.extend(effects::with_id(own.effect).into_iter().flat_map(|e| e.normal_load(&view)));
     }
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
     linear_errors(names, &balance, &base, &extended, balance.row_step_s)

@@ -146,7 +146,9 @@ fn of_contact_logs(
     if drive.is_none() {
         notes.push("no torque of M2: the drive is not looked at".to_string());
     }
-    progress("normal-load actuator");
+    if logs.iter().all(|log| log.m1_torque_nm.is_some()) {
+        progress("normal-load actuator");
+    }
     let mut normal_load = of_normal_load(&logs);
     if normal_load.is_none() {
         notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
@@ -165,8 +167,7 @@ fn of_contact_logs(
 fn of_drive_logs(train: &[Log], rotary: bool) -> Result<Linear, InputError> {
     let inertia = linear_part::drive_inertia(train)?;
     let logs = train.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
-    let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
-    Ok(linear_part::search_drive(&logs, &nothing, rotary))
+    Ok(linear_part::search_drive(&logs, &DrivePrior::default(), rotary))
 }
 
 impl Judgement {

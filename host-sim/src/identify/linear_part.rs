@@ -33,25 +33,13 @@ pub struct Linear {
 impl Linear {
     /// The best sets and all single causes, for the table.
     pub fn candidates(&self) -> Vec<Candidate> {
-        let mut out = Vec::new();
-        for (place, solved) in self.solved.iter().enumerate() {
-            let wanted = place < CANDIDATES || solved.set.len() < 2;
-            if !wanted {
-                continue;
-            }
+        let wanted = |(place, solved): &(usize, &Solved)| *place < CANDIDATES || solved.set.len() < 2;
+        let of_set = |(place, solved): (usize, &Solved)| {
             let names = solved.set.iter().map(|a| self.alternatives[*a].effect);
-            let mut effects: Vec<(&'static str, Contribution)> =
-                names.zip(self.contributions(solved)).collect();
-            effects.sort_by_key(|e| e.0);
-            out.push(Candidate {
-                effects: effects.iter().map(|e| e.0).collect(),
-                log_evidence: solved.log_evidence,
-                place,
-                contributions: effects.iter().map(|e| e.1).collect(),
-                forms: vec![LAW_FORM; effects.len()],
-            });
-        }
-        out
+            let effects = names.zip(self.contributions(solved)).map(|(effect, own)| (effect, LAW_FORM, own));
+            Candidate::new(place, solved.log_evidence, effects)
+        };
+        self.solved.iter().enumerate().filter(wanted).map(of_set).collect()
     }
 
     /// What each alternative of a set does, the others fitted again without it.
@@ -97,8 +85,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
 /// Where a column is missing.
 pub fn drive_inertia(logs: &[Log]) -> Result<f64, InputError> {
     let logs = logs.iter().map(|log| DriveLog::new(log, f64::INFINITY)).collect::<Result<Vec<_>, _>>()?;
-    let nothing = DrivePrior { inertia: None, coulomb: None, viscous: None };
-    let balance = drive::balance(&logs, &nothing, &DriveScales::new(&logs));
+    let balance = drive::balance(&logs, &DrivePrior::default(), &DriveScales::new(&logs));
     Ok(balance.solve(&[], &[]).p[drive::INERTIA].max(0.0))
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::effects::LIBRARY;
+use super::effects::{self, LIBRARY};
 use super::extended_model::Values;
 use super::holdout::{Errors, LogErrors};
 use super::judge::Judgement;
@@ -322,7 +322,7 @@ fn apart(found: &Found<'_>) -> Vec<Apart> {
 
 fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Cause {
     let judged = found.judgement;
-    let about = LIBRARY.iter().map(|e| e.about()).find(|a| a.id == id);
+    let about = effects::with_id(id).map(|effect| effect.about());
     let mut evidence = Vec::new();
     if let Some(about) = about {
         evidence.push(format!(
@@ -332,7 +332,7 @@ fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Ca
         ));
     }
     if let (Some(contact), Some(place)) = (&judged.contact, judged.place(Part::Friction)) {
-        let remark = LIBRARY.iter().find(|e| e.id() == id).and_then(|e| e.remark(contact, place));
+        let remark = effects::with_id(id).and_then(|effect| effect.remark(contact, place));
         evidence.extend(remark);
     }
     let without = judged.hypotheses.iter().find(|h| !h.effects.contains(&id));
@@ -424,7 +424,7 @@ fn groups(judged: &Judgement, verdict: &str) -> Vec<Vec<String>> {
 }
 
 fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>], apart: &[Apart]) -> String {
-    let about = |id: &str| LIBRARY.iter().map(|e| e.about()).find(|a| a.id == id);
+    let about = |id: &str| effects::with_id(id).map(|effect| effect.about());
     if let Some(pair) = groups.first() {
         let texts: Vec<&str> = pair.iter().filter_map(|id| about(id).map(|a| a.experiment)).collect();
         return format!("To tell {} apart: {}.", pair.join(" and "), texts.join("; or "));

@@ -47,6 +47,26 @@ pub struct Candidate {
     pub forms: Vec<f64>,
 }
 
+impl Candidate {
+    /// From what stands at a place in a balance's list: each effect with the share of its size that its form may be wrong by, and
+    /// what it does.
+    pub fn new(
+        place: usize,
+        log_evidence: f64,
+        effects: impl Iterator<Item = (&'static str, f64, Contribution)>,
+    ) -> Self {
+        let mut effects: Vec<(&'static str, f64, Contribution)> = effects.collect();
+        effects.sort_by_key(|e| e.0);
+        Self {
+            effects: effects.iter().map(|e| e.0).collect(),
+            log_evidence,
+            place,
+            contributions: effects.iter().map(|e| e.2).collect(),
+            forms: effects.iter().map(|e| e.1).collect(),
+        }
+    }
+}
+
 /// A hypothesis in the table.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {

@@ -9,7 +9,7 @@ use crate::files::log::{Log, LogKind};
 use crate::files::model_file::Extension;
 use crate::fit::drive::inverse::{Comparison, Motion, predict};
 use crate::fit::drive::record::{DriveRecord, FEWEST_SAMPLES};
-use crate::identify::effects::{DriveLaw, LIBRARY};
+use crate::identify::effects::{self, DriveLaw};
 use crate::identify::filters::shifted;
 use crate::input_error::InputError;
 
@@ -30,7 +30,7 @@ fn applied(extension: &Extension) -> Option<DriveLaw> {
     let value = |start: &str| {
         extension.parameters.iter().find(|(name, _)| name.starts_with(start)).map(|(_, value)| *value)
     };
-    LIBRARY.iter().find(|effect| effect.id() == extension.id)?.drive_law(&value)
+    effects::with_id(&extension.id)?.drive_law(&value)
 }
 
 /// A drive log as an even record.

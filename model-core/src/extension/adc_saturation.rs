@@ -16,10 +16,13 @@ impl<T: Real> AdcSaturation<T> {
     /// Names of the parameters: lowest and highest torque that the channel can show, N·m.
     pub const NAMES: &'static [&'static str] = &["friction_low_nm", "friction_high_nm"];
 
+    /// Size of an end that no torque reaches, N·m: the channel does not clip there.
+    pub const NO_END_NM: f64 = 1e9;
+
     /// Prepares the effect from values in the order of [`Self::NAMES`].
     pub fn new(values: &[T; 2]) -> Result<Self, ParameterError> {
         let [low, high] = *values;
-        let limit = T::from_f64(1e9);
+        let limit = T::from_f64(Self::NO_END_NM);
         Ok(Self {
             low: require("friction_low_nm", low, low >= -limit && low <= limit, "-1e9 to 1e9 N m")?,
             high: require("friction_high_nm", high, high > low && high <= limit, "above friction_low_nm")?,

@@ -1,5 +1,7 @@
 //! `adc_saturation`: a channel clips.
 
+use model_core::extension::adc_saturation::AdcSaturation as Law;
+
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::contact::log::END_NOISES;
@@ -11,9 +13,7 @@ use crate::identify::term::{Parameter, Starts};
 pub(super) struct AdcSaturation;
 
 /// The friction channel's ends in the core's law.
-const NAMES: [&str; 2] = ["friction_low_nm", "friction_high_nm"];
-/// An end that no torque reaches, in the core's law, N m.
-const NO_END_NM: f64 = 1e9;
+const NAMES: [&str; 2] = [Law::<f64>::NAMES[0], Law::<f64>::NAMES[1]];
 /// Share of samples that are spikes at most.
 const SPIKES: f64 = 1e-3;
 /// A clipped end holds at least this share of a channel's samples, …
@@ -74,7 +74,8 @@ impl Effect for AdcSaturation {
     }
 
     fn absent(&self, parameter: &str) -> f64 {
-        if parameter == NAMES[0] { -NO_END_NM } else { NO_END_NM }
+        let far = Law::<f64>::NO_END_NM;
+        if parameter == NAMES[0] { -far } else { far }
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -179,6 +180,9 @@ fn known(name: &str, mean: f64, sd: f64) -> Parameter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::model_file::ModelFile;
+    use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
+    use crate::identify::contact::change::Change;
     use crate::identify::noise::tests::white;
 
     const NOISE: f64 = 0.01;
@@ -196,6 +200,19 @@ mod tests {
         assert!(found.is_some_and(|end| (end - 3.0).abs() < 0.01), "{found:?}");
         // A rest is no end where another log goes beyond it.
         assert_eq!(end(&[swing(4.0, f64::INFINITY), rests], NOISE), None);
+    }
+
+    #[test]
+    fn an_end_that_is_not_found_is_no_parameter_and_cuts_nothing_in_the_core() {
+        let term = AdcSaturation.of_ends(2.0, [None, Some(3.0)]).expect("one end");
+        let mut change = Change::default();
+        (term.act)(&[1.4], &mut change);
+        assert_eq!(change.ends_nm, Some((f64::NEG_INFINITY, 2.8)));
+        let export = term.export.as_ref().expect("a law of the core");
+        let mut numbers = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).numbers;
+        assert_eq!(export(&[1.4], &mut numbers), [(NAMES[1].to_string(), 2.8)]);
+        let law = Law::new(&[AdcSaturation.absent(NAMES[0]), 2.8]).expect("allowed");
+        assert_eq!([law.shown_nm(-1e6), law.shown_nm(1e6)], [-1e6, 2.8]);
     }
 
     #[test]

@@ -155,6 +155,11 @@ macro_rules! library {
     };
 }
 
+/// The effect that has this id.
+pub fn with_id(id: &str) -> Option<&'static dyn Effect> {
+    LIBRARY.iter().copied().find(|effect| effect.id() == id)
+}
+
 library! {
     element_compliance::ElementCompliance,
     thermal_fade::ThermalFade,
