@@ -66,6 +66,8 @@ pub struct Alternative {
     pub constants: Vec<(String, f64)>,
     /// ln of the prior probability of this shape among those of the effect.
     pub log_prior: f64,
+    /// What its law follows, with its unit, where no coordinate of the balance is that.
+    pub coordinate: Option<(String, Vec<f64>)>,
 }
 
 impl Alternative {
@@ -88,6 +90,7 @@ impl Alternative {
             base_shift: Vec::new(),
             constants: Vec::new(),
             log_prior: 0.0,
+            coordinate: None,
         }
     }
 }
@@ -148,8 +151,8 @@ pub struct Solved {
     pub base: usize,
     /// Values: base, then alternative after alternative.
     pub p: Vec<f64>,
-    /// Standard deviations of the values.
-    pub std: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
     /// ln evidence, the likelihood with its share.
     pub log_evidence: f64,
     /// Residuals of all points, in the response's unit.
@@ -157,6 +160,11 @@ pub struct Solved {
 }
 
 impl Solved {
+    /// Standard deviation of a value.
+    pub fn std(&self, at: usize) -> f64 {
+        self.covariance[(at, at)].max(0.0).sqrt()
+    }
+
     /// The forms of its set, each with the places of its parameters among the values.
     pub fn forms<'s>(
         &'s self,
@@ -290,8 +298,7 @@ impl Balance {
         for (c, p) in columns.iter().zip(&p) {
             residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
         }
-        let std = (0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
-        Solved { set: Vec::new(), base: self.base.len(), p, std, log_evidence, residual }
+        Solved { set: Vec::new(), base: self.base.len(), p, covariance, log_evidence, residual }
     }
 
     /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.

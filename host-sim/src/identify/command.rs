@@ -1,5 +1,6 @@
 //! The whole diagnosis, from logs to the files' contents.
 
+use super::component::Drawn;
 use super::extended_model::{self, Values};
 use super::holdout;
 use super::judge::{Judgement, judge};
@@ -58,10 +59,11 @@ pub fn diagnose(
     progress("held-out logs");
     let on_train = holdout::errors(&judgement, train, rig, true)?;
     let on_holdout = holdout::errors(&judgement, holdout, rig, false)?;
-    let mut values = Values::new();
+    let (mut values, mut drawn) = (Values::new(), Vec::new());
     for (part, linear) in [(Part::Drive, &judgement.drive), (Part::Pressure, &judgement.normal_load)] {
         if let (Some(linear), Some(place)) = (linear, judgement.place(part)) {
             values.extend(extended_model::linear_values(linear, place));
+            drawn.push(Drawn::of_balance(part, linear, place));
         }
     }
     extended_model::add_amplitudes(&mut values);
@@ -74,6 +76,7 @@ pub fn diagnose(
                 extended = extended.fitted(model, rig, train, &|| ());
             }
             values.extend(extended.values);
+            drawn.insert(0, Drawn::of_contact(contact, &extended.fit));
             extended.model.to_toml() + &extended_model::remarks(&judgement)
         }
         None => extended_model::drive_text(&judgement),
@@ -82,6 +85,6 @@ pub fn diagnose(
     let found =
         Found { judgement: &judgement, kind, values: &values, train: &on_train, holdout: &on_holdout };
     let diagnosis = Diagnosis::new(&found, wall_s());
-    let page = page::page(&diagnosis, &judgement, &on_holdout);
+    let page = page::page(&diagnosis, &drawn, &on_holdout);
     Ok(Written { diagnosis, model: text, page, judgement })
 }

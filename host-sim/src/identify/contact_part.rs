@@ -9,7 +9,7 @@ use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search;
-use super::effects::coordinates::{Coordinates, Scales};
+use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales};
 use super::effects::{ContactView, LIBRARY};
 use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
 use super::linear_part::Linear;
@@ -238,8 +238,11 @@ pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<
     let all: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
     let signal = |of: &dyn Fn(&ContactLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
     let own = |of: &dyn Fn(&Coordinates) -> Vec<f64>| all.iter().flat_map(of).collect::<Vec<f64>>();
-    vec![
-        ("heat held, J".into(), own(&|c| c.heat_j[1].clone())),
+    let heat = HEAT_TIMES_S.iter().enumerate();
+    let mut out: Vec<(String, Vec<f64>)> = heat
+        .map(|(at, time_s)| (format!("heat held for {time_s} s, J"), own(&|c| c.heat_j[at].clone())))
+        .collect();
+    out.extend([
         ("distance slid, m".into(), own(&|c| c.distance_m.clone())),
         ("normal force, N".into(), signal(&|log| log.load_n.clone())),
         ("sliding speed, m/s".into(), signal(&|log| log.root_speed_m_s.clone())),
@@ -248,5 +251,6 @@ pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<
             signal(&|log| log.angle_rad.iter().map(|a| a.rem_euclid(std::f64::consts::TAU)).collect()),
         ),
         ("time, s".into(), signal(&|log| log.grid.time_s.clone())),
-    ]
+    ]);
+    out
 }

@@ -171,6 +171,23 @@ impl DriveLog {
     }
 }
 
+/// What effects in the drive may follow, with units, all logs on end.
+pub fn coordinates(logs: &[DriveLog], rotary: bool) -> Vec<(String, Vec<f64>)> {
+    let all = |of: &dyn Fn(&DriveLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let (place, length) = if rotary { ("angle within a turn", "rad") } else { ("position", "m") };
+    let within = |x: &f64| if rotary { x.rem_euclid(std::f64::consts::TAU) } else { *x };
+    let mut out = vec![
+        (format!("speed, {length}/s"), all(&|log| log.speed.clone())),
+        (format!("acceleration, {length}/s²"), all(&|log| log.acceleration.clone())),
+        (format!("{place}, {length}"), all(&|log| log.position.iter().map(within).collect())),
+        ("time, s".into(), all(&|log| log.grid.time_s.clone())),
+    ];
+    if logs.iter().all(|log| log.load_n.is_some()) {
+        out.push(("normal force, N".into(), all(&|log| log.load_n.clone().unwrap_or_default())));
+    }
+    out
+}
+
 /// Share of an angle's noise that is left in its second derivative, per sample squared: white noise; beside a contact the error
 /// of a count at worst, all at the frequency that the filter passes best. A speed loop that swings by half a count repeats it.
 /// A drive alone is looked at for its ripple, which a filter that is wide enough for that would take out.

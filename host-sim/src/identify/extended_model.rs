@@ -45,6 +45,8 @@ pub struct ExtendedContact {
     pub model: ModelFile,
     /// Parameters of the effects in the contact.
     pub values: Values,
+    /// The answer with its laws, and the covariance of its values.
+    pub fit: (Fit, DMatrix<f64>),
 }
 
 /// The contact's answer in the core's laws.
@@ -129,7 +131,7 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
             extended.extensions.pop();
         }
     }
-    Ok(ExtendedContact { model: extended, values })
+    Ok(ExtendedContact { model: extended, values, fit: (fit, covariance) })
 }
 
 impl ExtendedContact {
@@ -142,14 +144,14 @@ impl ExtendedContact {
         let free = fit_parameters::default_free(&self.model);
         let fit = fit_contact::identify(&self.model, rig, logs, &free, Begin::There, progress);
         let Ok(fit) = fit else { return self };
-        let Self { mut values, .. } = self;
+        let Self { mut values, fit: laws, .. } = self;
         for (at, name) in fit.names.iter().enumerate() {
             let std = fit.ends[at].map(|_| fit.std[at]);
             for own in values.values_mut().filter_map(|entry| entry.get_mut(name)) {
                 *own = Value { value: fit.values[at], std };
             }
         }
-        Self { model: fit.model, values }
+        Self { model: fit.model, values, fit: laws }
     }
 }
 
@@ -206,7 +208,7 @@ pub fn linear_values(part: &Linear, place: usize) -> Values {
     for (alternative, places) in solved.forms(&part.alternatives) {
         let entry = out.entry(alternative.effect).or_default();
         for (q, i) in alternative.parameters.iter().zip(places) {
-            entry.insert(q.name.clone(), Value { value: solved.p[i], std: Some(solved.std[i]) });
+            entry.insert(q.name.clone(), Value { value: solved.p[i], std: Some(solved.std(i)) });
         }
         for (name, value) in &alternative.constants {
             entry.insert(name.clone(), Value { value: *value, std: None });

@@ -24,6 +24,10 @@ pub struct Linear {
     pub solved: Vec<Solved>,
     /// RMS of the response over its rows.
     pub signal: f64,
+    /// What its effects may follow, with units.
+    pub coordinates: Vec<(String, Vec<f64>)>,
+    /// Its unit.
+    pub unit: &'static str,
     /// Scales of the drive's columns.
     pub drive_scales: Option<DriveScales>,
     /// Scales of the normal-load actuator's columns.
@@ -61,6 +65,7 @@ impl Linear {
             &solved.residual,
             none.map(|s| s.residual.as_slice()),
             solved.set.len(),
+            &self.coordinates,
         )
     }
 }
@@ -76,7 +81,16 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
-    Linear { balance, alternatives, solved, signal, drive_scales: Some(scales), normal_load_scales: None }
+    Linear {
+        balance,
+        alternatives,
+        solved,
+        signal,
+        coordinates: drive::coordinates(logs, rotary),
+        unit: if rotary { "N m" } else { "N" },
+        drive_scales: Some(scales),
+        normal_load_scales: None,
+    }
 }
 
 /// Inertia or mass by a first balance through the widest filter: it says how narrow the filter may be.
@@ -108,5 +122,14 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
     let signal = balance.rms(&balance.response);
-    Linear { balance, alternatives, solved, signal, drive_scales: None, normal_load_scales: Some(scales) }
+    Linear {
+        balance,
+        alternatives,
+        solved,
+        signal,
+        coordinates: normal_load::coordinates(logs),
+        unit: "N m",
+        drive_scales: None,
+        normal_load_scales: Some(scales),
+    }
 }

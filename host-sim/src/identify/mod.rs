@@ -2,6 +2,7 @@
 
 pub mod balance;
 pub mod command;
+mod component;
 pub mod contact;
 pub mod contact_part;
 pub mod coupling;

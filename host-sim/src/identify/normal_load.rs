@@ -105,6 +105,22 @@ impl NormalLoadScales {
     }
 }
 
+/// What effects in the normal-load actuator may follow, with units, all logs on end.
+pub fn coordinates(logs: &[NormalLoadLog]) -> Vec<(String, Vec<f64>)> {
+    let all = |of: &dyn Fn(&NormalLoadLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
+    let rate =
+        |log: &NormalLoadLog| gaussian(&log.normal_n, WIDTH, 1).iter().map(|d| d / log.step_s).collect();
+    let mut out = vec![
+        ("normal force, N".into(), all(&|log| log.filtered_n.clone())),
+        ("rate of the normal force, N/s".into(), all(&rate)),
+        ("time, s".into(), all(&|log| log.time_s.clone())),
+    ];
+    if logs.iter().all(|log| log.angle_rad.is_some()) {
+        out.push(("angle of M1, rad".into(), all(&|log| log.angle_rad.clone().unwrap_or_default())));
+    }
+    out
+}
+
 /// The balance of these logs.
 pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales) -> Balance {
     let concat = |of: &dyn Fn(&NormalLoadLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();

@@ -311,7 +311,8 @@ fn follows(
         let chance = BINS as f64 / points.len() as f64;
         let share = if all > 0.0 { (between / all - chance).max(0.0) } else { 0.0 };
         if share > 0.1 {
-            out.push((name.clone(), share));
+            // Without its unit.
+            out.push((name.split(", ").next().unwrap_or(name).to_string(), share));
         }
     }
     out.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -331,20 +332,25 @@ pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &
 
 /// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set
 /// explains counts.
-pub fn of_balance(balance: &Balance, residual: &[f64], none: Option<&[f64]>, causes: usize) -> Rest {
+pub fn of_balance(
+    balance: &Balance,
+    residual: &[f64],
+    none: Option<&[f64]>,
+    causes: usize,
+    coordinates: &[(String, Vec<f64>)],
+) -> Rest {
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
     let noise = Noise::white(balance.first_deviation.clone());
     let (rest, left) = structured(residual, &noise, &balance.used, block);
     let before = none.map_or(rest, |none| structured(none, &noise, &balance.used, block).0);
-    let time: Vec<f64> = (0..residual.len()).map(|i| i as f64).collect();
     Rest {
         size: rest.sqrt() / balance.scale.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained / balance.scale.max(1e-12),
         times_noise: rest / left.max(1e-300),
         further_causes: causes.saturating_sub(1),
-        follows: follows(residual, &balance.used, block, &[("time".into(), time)]),
+        follows: follows(residual, &balance.used, block, coordinates),
     }
 }
 

@@ -30,6 +30,15 @@ impl Part {
             Self::Pressure => "pressure",
         }
     }
+
+    /// What it balances, without its unit.
+    pub fn quantity(self) -> &'static str {
+        match self {
+            Self::Friction => "friction torque",
+            Self::Drive => "effort of the drive",
+            Self::Pressure => "torque of M1",
+        }
+    }
 }
 
 /// A set of effects in one balance.

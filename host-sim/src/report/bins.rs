@@ -20,51 +20,115 @@ pub struct Series<'a> {
     pub values: &'a [f64],
 }
 
-/// Mean of each series in bins of `over`, with the standard error of the first in the caption; none where the quantity
-/// has fewer than three different bins. `over_title` and `title` carry units behind a comma.
-#[must_use]
+/// Samples in bins of a quantity.
+#[derive(Debug, Clone)]
+pub struct Bins {
+    rows: Vec<usize>,
+    size: usize,
+    /// Mean of the quantity in each.
+    x: Vec<f64>,
+}
+
 #[allow(clippy::cast_precision_loss)]
-pub fn chart(over_title: &str, over: &[f64], title: &str, series: &[Series<'_>]) -> Option<Chart> {
-    let finite = |k: &usize| {
-        over[*k].is_finite() && series.iter().all(|s| s.values.get(*k).is_some_and(|v| v.is_finite()))
-    };
-    let mut rows: Vec<usize> = (0..over.len()).filter(finite).collect();
-    rows.sort_by(|a, b| over[*a].total_cmp(&over[*b]));
-    let size = rows.len().div_ceil(MOST).max(FEWEST);
-    let bins: Vec<&[usize]> = rows.chunks(size).filter(|bin| bin.len() >= FEWEST).collect();
-    let mean = |bin: &[usize], of: &[f64]| bin.iter().map(|k| of[*k]).sum::<f64>() / bin.len() as f64;
-    let x: Vec<f64> = bins.iter().map(|bin| mean(bin, over)).collect();
-    let span = x.last().zip(x.first()).map_or(0.0, |(last, first)| last - first);
-    let size_of_it = x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    if x.len() < 3 || span <= 1e-6 * size_of_it {
-        return None;
+impl Bins {
+    /// Of these samples; none where the quantity has fewer than three different bins of them.
+    #[must_use]
+    pub fn new(over: &[f64], mut rows: Vec<usize>) -> Option<Self> {
+        rows.retain(|k| over[*k].is_finite());
+        rows.sort_by(|a, b| over[*a].total_cmp(&over[*b]));
+        let size = rows.len().div_ceil(MOST).max(FEWEST);
+        let mut bins = Self { rows, size, x: Vec::new() };
+        bins.x = bins.means(over);
+        let span = bins.x.last().zip(bins.x.first()).map_or(0.0, |(last, first)| last - first);
+        let size_of_it = bins.x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        (bins.x.len() >= 3 && span > 1e-6 * size_of_it).then_some(bins)
     }
-    let line = |s: &Series<'_>| {
-        let y = bins.iter().map(|bin| mean(bin, s.values)).collect();
-        Line { name: s.name.into(), role: s.role, x: x.clone(), y, tolerance: 0.0, fine_tolerance: 0.0 }
-    };
-    let lines: Vec<Line> = series.iter().map(line).collect();
-    let counts: Vec<usize> = bins.iter().map(|bin| bin.len()).collect();
-    let samples = Line {
-        name: "samples".into(),
-        role: Role::Reference,
-        x: x.clone(),
-        y: counts.iter().map(|n| *n as f64).collect(),
-        tolerance: 0.0,
-        fine_tolerance: 0.0,
-    };
-    let quantity = over_title.split(", ").next().unwrap_or(over_title);
-    Some(Chart {
-        title: format!("By {quantity}"),
-        caption: format!("Means of {} bins; below, the samples in each.", bins.len()),
-        x_title: over_title.into(),
-        panels: vec![
-            Panel { y_title: title.into(), lines },
-            Panel { y_title: "samples in the bin".into(), lines: vec![samples] },
-        ],
-        counts,
-        ..Chart::default()
-    })
+
+    fn each(&self) -> impl Iterator<Item = &[usize]> {
+        self.rows.chunks(self.size).filter(|bin| bin.len() >= FEWEST)
+    }
+
+    /// Mean of the values in each bin.
+    #[must_use]
+    pub fn means(&self, values: &[f64]) -> Vec<f64> {
+        self.slopes(values, &|_| 1.0)
+    }
+
+    /// Slope of the values against a regressor in each bin, Σwy/Σw²; of one that is 1 everywhere the mean.
+    #[must_use]
+    pub fn slopes(&self, values: &[f64], regressor: &dyn Fn(usize) -> f64) -> Vec<f64> {
+        let slope = |bin: &[usize]| {
+            let both = |k: &usize| (regressor(*k) * values[*k], regressor(*k).powi(2));
+            let (of_both, square) =
+                bin.iter().map(both).fold((0.0, 0.0), |sum, of| (sum.0 + of.0, sum.1 + of.1));
+            of_both / square.max(f64::MIN_POSITIVE)
+        };
+        self.each().map(slope).collect()
+    }
+
+    /// Share of the values' mean square that these slopes explain, less what chance gives.
+    #[must_use]
+    pub fn share(&self, values: &[f64], regressor: &dyn Fn(usize) -> f64) -> f64 {
+        let slopes = self.slopes(values, regressor);
+        let left = |(bin, slope): (&[usize], &f64)| -> f64 {
+            bin.iter().map(|k| (values[*k] - slope * regressor(*k)).powi(2)).sum()
+        };
+        let left: f64 = self.each().zip(&slopes).map(left).sum();
+        let all: f64 = self.each().flatten().map(|k| values[*k].powi(2)).sum();
+        let chance = slopes.len() as f64 / self.rows.len().max(1) as f64;
+        if all > 0.0 { (1.0 - left / all - chance).max(0.0) } else { 0.0 }
+    }
+
+    /// A line through these means.
+    #[must_use]
+    pub fn line(&self, name: &str, role: Role, means: Vec<f64>) -> Line {
+        Line { name: name.into(), role, x: self.x.clone(), y: means, tolerance: 0.0, fine_tolerance: 0.0 }
+    }
+
+    /// What lies between the means less and plus these widths.
+    #[must_use]
+    pub fn band(&self, name: &str, means: &[f64], widths: &[f64]) -> Line {
+        let edge = |sign: f64| means.iter().zip(widths).map(move |(mean, width)| mean + sign * width);
+        let y = edge(1.0).chain(edge(-1.0).rev()).collect();
+        let x = self.x.iter().chain(self.x.iter().rev()).copied().collect();
+        Line { x, ..self.line(name, Role::Band, y) }
+    }
+
+    /// A chart of these lines; `over_title` and `title` carry units behind a comma.
+    #[must_use]
+    pub fn chart(&self, over_title: &str, title: &str, lines: Vec<Line>) -> Chart {
+        let counts: Vec<usize> = self.each().map(<[usize]>::len).collect();
+        let quantity = over_title.split(", ").next().unwrap_or(over_title);
+        Chart {
+            title: format!("By {quantity}"),
+            caption: format!("Means of {} bins.", counts.len()),
+            x_title: over_title.into(),
+            panels: vec![Panel { y_title: title.into(), lines }],
+            counts,
+            ..Chart::default()
+        }
+    }
+
+    /// With a panel of the samples in each bin.
+    #[must_use]
+    pub fn chart_with_counts(&self, over_title: &str, title: &str, lines: Vec<Line>) -> Chart {
+        let mut chart = self.chart(over_title, title, lines);
+        let counts = chart.counts.iter().map(|n| *n as f64).collect();
+        let samples = self.line("samples", Role::Reference, counts);
+        chart.panels.push(Panel { y_title: "samples in the bin".into(), lines: vec![samples] });
+        chart.caption = format!("Means of {} bins; below, the samples in each.", chart.counts.len());
+        chart
+    }
+}
+
+/// Mean of each series in bins of `over`; none where the quantity has fewer than three different bins. `over_title` and
+/// `title` carry units behind a comma.
+#[must_use]
+pub fn chart(over_title: &str, over: &[f64], title: &str, series: &[Series<'_>]) -> Option<Chart> {
+    let finite = |k: &usize| series.iter().all(|s| s.values.get(*k).is_some_and(|v| v.is_finite()));
+    let bins = Bins::new(over, (0..over.len()).filter(finite).collect())?;
+    let lines = series.iter().map(|s| bins.line(s.name, s.role, bins.means(s.values))).collect();
+    Some(bins.chart_with_counts(over_title, title, lines))
 }
 
 #[cfg(test)]
@@ -91,5 +155,23 @@ mod tests {
         let series = [Series { name: "residual", role: Role::Measured, values: &values }];
         assert!(chart("speed, rad/s", &[3.0; 500], "residual, N m", &series).is_none());
         assert!(chart("speed, rad/s", &[1.0, 2.0], "residual, N m", &series).is_none());
+    }
+
+    #[test]
+    fn a_share_is_what_the_means_of_the_bins_explain() {
+        let over: Vec<f64> = (0..8000).map(|k| f64::from(k % 101)).collect();
+        let bins = Bins::new(&over, (0..8000).collect()).unwrap();
+        let follows: Vec<f64> = over.iter().map(|x| x - 50.0).collect();
+        let not: Vec<f64> = (0..8000).map(|k| f64::from(k % 7) - 3.0).collect();
+        let mixed: Vec<f64> = follows.iter().zip(&not).map(|(a, b)| a + 14.6 * b).collect();
+        let share = |values: &[f64]| bins.share(values, &|_| 1.0);
+        assert!(share(&follows) > 0.98 && share(&not) < 0.01, "{} {}", share(&follows), share(&not));
+        // Both have a mean square of 850.
+        assert!((share(&mixed) - 0.5).abs() < 0.03, "{}", share(&mixed));
+        // Against a regressor.
+        let sign = |k: usize| if k.is_multiple_of(2) { 2.0 } else { -2.0 };
+        let signed: Vec<f64> = follows.iter().enumerate().map(|(k, x)| sign(k) * x).collect();
+        assert!(share(&signed) < 0.05 && bins.share(&signed, &sign) > 0.98);
+        assert!((bins.slopes(&signed, &sign)[0] - bins.means(&follows)[0]).abs() < 1e-9);
     }
 }

@@ -20,6 +20,8 @@ pub enum Role {
     Measured,
     /// What was asked for, or a bound.
     Reference,
+    /// What lies between two courses: its line goes along one and back along the other.
+    Band,
 }
 
 impl Role {
@@ -32,6 +34,7 @@ impl Role {
             Self::ModifiedLugre => "modified_lugre",
             Self::Measured => "measured",
             Self::Reference => "reference",
+            Self::Band => "band",
         }
     }
 }

@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::chart::{Chart, Panel};
+use super::chart::{Chart, Line, Panel, Role};
 
 const WIDTH: u32 = 860;
 const PANEL: u32 = 220;
@@ -15,6 +15,12 @@ const COLOURS: [RGBColor; 5] = [
     RGBColor(190, 80, 160),
     RGBColor(138, 90, 0),
 ];
+/// Height of the row of names, room for the labels of the vertical axis, and width of a letter, pixels.
+const LEGEND: i32 = 22;
+const LABELS: i32 = 78;
+const LETTER: i32 = 7;
+/// How much of a band's colour is seen.
+const BAND: f64 = 0.2;
 /// Points of a line: two a pixel column, its lowest and its highest, keep every spike.
 const COLUMNS: usize = 300;
 
@@ -59,7 +65,7 @@ fn draw_panel(
     let shown = chart.windows.first().map(|window| window.range);
     // A line that is a function of a rising abscissa has its columns at places of the record, and no point of it is copied.
     let rising = !(chart.log_x || chart.plane) && chart.counts.is_empty();
-    let lines: Vec<(&str, Vec<(f64, f64)>)> = panel
+    let lines: Vec<(&Line, Vec<(f64, f64)>)> = panel
         .lines
         .iter()
         .map(|line| {
@@ -67,7 +73,7 @@ fn draw_panel(
             let (from, to) = (from.min(line.y.len()), to.min(line.y.len()));
             let (x, y) = (&line.x[from..to], &line.y[from..to]);
             if rising && y.iter().all(|y| y.is_finite()) {
-                return (line.name.as_str(), columns(x, y));
+                return (line, columns(x, y));
             }
             let points: Vec<(f64, f64)> = x
                 .iter()
@@ -77,7 +83,7 @@ fn draw_panel(
                 .filter(|(x, _)| shown.is_none_or(|(from, to)| chart.log_x || (from..=to).contains(x)))
                 .collect();
             let exact = chart.plane || !chart.counts.is_empty();
-            (line.name.as_str(), if exact { every(&points) } else { envelope(&points) })
+            (line, if exact { every(&points) } else { envelope(&points) })
         })
         .collect();
     let (x, y) = (
@@ -86,11 +92,14 @@ fn draw_panel(
     );
     let (Some(x), Some(y)) = (x, y) else { return Ok(()) };
     let room = 0.06 * (y.1 - y.0);
+    let (names, area) = area.split_vertically(LEGEND);
+    draw_names(panel, &names)?;
     let text = ("sans-serif", 13).into_font().color(&INK);
-    let mut axes = ChartBuilder::on(area)
+    let mut axes = ChartBuilder::on(&area)
         .margin(6)
+        .margin_top(0)
         .x_label_area_size(if last { 40 } else { 20 })
-        .y_label_area_size(64)
+        .y_label_area_size(LABELS)
         .build_cartesian_2d(x.0..x.1, y.0 - room..y.1 + room)?;
     let log_x = chart.log_x;
     axes.configure_mesh()
@@ -104,25 +113,63 @@ fn draw_panel(
         .x_desc(if last { chart.x_title.as_str() } else { "" })
         .y_desc(panel.y_title.as_str())
         .draw()?;
-    for ((name, points), colour) in lines.into_iter().zip(COLOURS.into_iter().cycle()) {
+    for ((line, points), colour) in lines.into_iter().zip(colours(panel)) {
+        if line.role == Role::Band {
+            axes.draw_series([Polygon::new(points, colour.mix(BAND))])?;
+            continue;
+        }
         if !chart.counts.is_empty() {
             axes.draw_series(points.iter().map(|point| Circle::new(*point, 3, colour.filled())))?;
+            // Means of what was measured stand against a law as points.
+            if line.role == Role::Measured && panel.lines.len() > 1 {
+                continue;
+            }
         }
-        axes.draw_series(LineSeries::new(points, colour.stroke_width(2)))?
-            .label(name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour));
+        axes.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
     }
-    axes.configure_series_labels()
-        .border_style(INK.mix(0.4))
-        .label_font(("sans-serif", 12).into_font().color(&INK))
-        .draw()?;
+    Ok(())
+}
+
+/// A colour for each line; a band has that of the last line, whose band it is.
+fn colours(panel: &Panel) -> Vec<RGBColor> {
+    let mut own = COLOURS.into_iter().cycle();
+    let lines = panel.lines.iter().filter(|line| line.role != Role::Band).count();
+    let last = COLOURS[lines.saturating_sub(1) % COLOURS.len()];
+    let of = |line: &Line| if line.role == Role::Band { Some(last) } else { own.next() };
+    panel.lines.iter().filter_map(of).collect()
+}
+
+/// Names of the lines in one row above the axes, where they hide nothing.
+fn draw_names(panel: &Panel, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Drawn<()> {
+    let text = ("sans-serif", 12).into_font().color(&INK);
+    let mut left = LABELS;
+    for (line, colour) in panel.lines.iter().zip(colours(panel)) {
+        let middle = LEGEND / 2;
+        if line.role == Role::Band {
+            area.draw(&Rectangle::new(
+                [(left, middle - 5), (left + 16, middle + 5)],
+                colour.mix(BAND).filled(),
+            ))?;
+        } else {
+            area.draw(&PathElement::new([(left, middle), (left + 16, middle)], colour.stroke_width(2)))?;
+        }
+        area.draw(&Text::new(line.name.as_str(), (left + 21, middle - 6), text.clone()))?;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+        let letters = line.name.chars().count() as i32;
+        left += 21 + LETTER * letters + 20;
+    }
     Ok(())
 }
 
 /// Label of a tick of a linear axis: zero is a sum of steps that do not add up to it in the last place.
 fn tick(at: f64, (low, high): (f64, f64)) -> String {
     let rounding = 1e-9 * (high - low);
-    super::value::plain(if at.abs() < rounding { 0.0 } else { at })
+    let text = super::value::plain(if at.abs() < rounding { 0.0 } else { at });
+    // Ticks are at round numbers: zeros at the end say nothing, and take room.
+    let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));
+    let short =
+        if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits };
+    format!("{short}{power}")
 }
 
 /// First and last place of a rising abscissa within a range.
@@ -185,14 +232,14 @@ fn every(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Line, Role, Window};
+    use crate::report::Window;
 
     #[test]
     fn a_tick_at_zero_says_so() {
         let steps = -0.3 + 0.1 + 0.1 + 0.1;
         assert!(steps != 0.0);
         assert_eq!(tick(steps, (-0.3, 0.2)), "0");
-        assert_eq!(tick(2.5e-16, (0.0, 1e-15)), "2.500e-16");
+        assert_eq!(tick(2.5e-16, (0.0, 1e-15)), "2.5e-16");
     }
 
     fn chart() -> Chart {

@@ -5,19 +5,19 @@
   const light = {
     paper: "#ffffff", ink: "#1b1f24", grid: "#e3e7eb", axis: "#8c959f",
     series: "#b3261e", brush: "#1a7f37", lugre: "#0b57c2", lugre_patch: "#7a3fb8", modified_lugre: "#8a5a00",
-    measured: "#4a5568", reference: "#8c959f",
+    measured: "#4a5568", reference: "#8c959f", band: "rgba(179,38,30,0.18)",
   };
   const dark = {
     paper: "#14171c", ink: "#e6e9ed", grid: "#2b323b", axis: "#6e7883",
     series: "#ff7b72", brush: "#56d364", lugre: "#79b8ff", lugre_patch: "#d2a8ff", modified_lugre: "#e3b341",
-    measured: "#aab4c0", reference: "#8b95a1",
+    measured: "#aab4c0", reference: "#8b95a1", band: "rgba(255,123,114,0.22)",
   };
   const dash = {
     series: "solid", brush: "dashdot", lugre: "solid", lugre_patch: "dot", modified_lugre: "dash",
-    measured: "solid", reference: "dot",
+    measured: "solid", reference: "dot", band: "solid",
   };
   const symbol = { measured: "circle", series: "diamond", reference: "cross" };
-  const width = { series: 2, measured: 1.4, reference: 1.4 };
+  const width = { series: 2, measured: 1.4, reference: 1.4, band: 0 };
   const query = window.matchMedia("(prefers-color-scheme: dark)");
   const scheme = () => (query.matches ? dark : light);
 
@@ -54,13 +54,21 @@
 
   const toAxis = (chart, range) => (chart.log ? range.map(Math.log10) : range);
 
+  // Means of what was measured stand against a law as points.
+  function mode(chart, t) {
+    if (!chart.counts.length || t.role === "band") return "lines";
+    const alone = chart.traces.filter((other) => other.row === t.row).length === 1;
+    return t.role === "measured" && !alone ? "markers" : "lines+markers";
+  }
+
   function traces(chart, c) {
     return chart.traces.map((t) => ({
-      type: "scatter", mode: chart.counts.length ? "lines+markers" : "lines", name: t.name, legendgroup: t.name, showlegend: t.legend, x: t.x, y: t.y,
+      type: "scatter", mode: mode(chart, t), name: t.name, legendgroup: t.name, showlegend: t.legend, x: t.x, y: t.y,
       yaxis: "y" + axis(t.row), xaxis: "x",
       line: { color: c[t.role], dash: dash[t.role], width: width[t.role] || 1.7 },
       marker: { color: c[t.role], size: 7, symbol: symbol[t.role] || "circle" },
       customdata: chart.counts,
+      ...(t.role === "band" ? { fill: "toself", fillcolor: c.band, hoverinfo: "skip" } : {}),
       hovertemplate: `%{y:.5~g}${unit(chart.panels[t.row])} at %{x:.6~g}${unit(chart.x)}`
         + (chart.counts.length ? ", mean of %{customdata} samples" : ""),
     }));
@@ -172,7 +180,7 @@
     const c = scheme();
     for (const [div, chart] of drawn) {
       const style = traces(chart, c).map((t) => t.line.color);
-      Plotly.restyle(div, { "line.color": style });
+      Plotly.restyle(div, { "line.color": style, fillcolor: style });
       const next = layout(chart, c);
       const change = { paper_bgcolor: c.paper, plot_bgcolor: c.paper, font: next.font, hoverlabel: next.hoverlabel };
       for (const name of ["xaxis", ...chart.panels.map((_, row) => "yaxis" + axis(row))]) {

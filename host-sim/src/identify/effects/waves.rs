@@ -225,6 +225,16 @@ impl Waves<'_> {
             }
         }
         let orders_count = orders.len();
+        // Where each log has a phase of its own, its waves do not lie on each other.
+        let coordinate = orders.first().filter(|_| !own_phase || self.positions.len() == 1).map(|k| {
+            let within = |x: &f64| x.rem_euclid(TAU / k);
+            let name = if self.rotary {
+                format!("angle within a wave of order {k:.2}, rad")
+            } else {
+                format!("position within a wave of {:.2} mm, m", 1e3 * TAU / k)
+            };
+            (name, self.positions.iter().flat_map(|x| x.iter().map(within)).collect())
+        });
         // In the order in which the parameters stand: log after log, order after order, cosine and sine.
         let same_amplitude = if own_phase && self.positions.len() > 1 {
             let places = |order: usize| {
@@ -250,6 +260,7 @@ impl Waves<'_> {
             constants: orders.iter().enumerate().map(constant).collect(),
             // The orders were chosen among so many.
             log_prior: -(orders_count as f64) * (candidates.max(1) as f64).ln(),
+            coordinate,
             ..Alternative::columns(self.effect, parameters, columns)
         }
     }
