@@ -58,8 +58,6 @@ pub struct Alternative {
     pub disc: Option<DiscMotion>,
     /// Waves whose amplitude is the same in all logs: of each the places of cosine and sine among the parameters, log by log.
     pub same_amplitude: Vec<Vec<[usize; 2]>>,
-    /// Base columns that this form replaces, by their place.
-    pub replaces: Vec<(usize, Vec<f64>)>,
     /// Change of the prior means of base parameters.
     pub base_shift: Vec<(usize, f64)>,
     /// Values of what is not linear.
@@ -86,7 +84,6 @@ impl Alternative {
             response: None,
             disc: None,
             same_amplitude: Vec::new(),
-            replaces: Vec::new(),
             base_shift: Vec::new(),
             constants: Vec::new(),
             log_prior: 0.0,
@@ -231,15 +228,12 @@ impl Balance {
     /// Solves these forms; the set of what it gives is empty.
     pub fn solve_forms(&self, chosen: &[&Alternative]) -> Solved {
         let mut response = self.response.clone();
-        let mut base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
+        let base = self.base.iter().map(|b| &b.1);
         let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
         let mut log_prior = 0.0;
         for alternative in chosen {
             if let Some(added) = &alternative.response {
                 response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
-            }
-            for (place, column) in &alternative.replaces {
-                base[*place] = column;
             }
             for (place, shift) in &alternative.base_shift {
                 parameters[*place].mean += shift;
@@ -247,8 +241,7 @@ impl Balance {
             log_prior += alternative.log_prior;
         }
         parameters.extend(chosen.iter().flat_map(|a| a.parameters.iter().cloned()));
-        let columns: Vec<&Vec<f64>> =
-            base.into_iter().chain(chosen.iter().flat_map(|a| a.columns.iter())).collect();
+        let columns: Vec<&Vec<f64>> = base.chain(chosen.iter().flat_map(|a| a.columns.iter())).collect();
 
         let y: Vec<f64> = self.used.iter().map(|&i| response[i] / self.deviation[i]).collect();
         let x: Vec<Vec<f64>> =

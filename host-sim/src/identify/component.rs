@@ -64,13 +64,7 @@ impl Drawn {
         let (balance, solved) = (&linear.balance, &linear.solved[place]);
         let none = linear.solved.iter().find(|s| s.set.is_empty()).unwrap_or(solved);
         let component = |(form, own): (&Alternative, std::ops::Range<usize>)| {
-            let (mut places, mut columns): (Vec<usize>, Vec<Vec<f64>>) =
-                (own.collect(), form.columns.clone());
-            for (place, column) in &form.replaces {
-                places.push(*place);
-                columns
-                    .push(column.iter().zip(&balance.base[*place].1).map(|(new, old)| new - old).collect());
-            }
+            let (places, columns): (Vec<usize>, Vec<Vec<f64>>) = (own.collect(), form.columns.clone());
             let mut values = form.response.as_ref().map_or_else(
                 || vec![0.0; balance.response.len()],
                 |added| added.iter().map(|added| -added).collect(),

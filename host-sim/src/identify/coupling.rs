@@ -1,11 +1,15 @@
 //! What joins motor and disc: a spring, or a spring with play, and its numbers.
 //!
-//! T_s = k (x + β x³) + d x′(φ) φ̇ over the twist φ, with the overlap
+//! Play: T_s = k x + d x′(φ) φ̇ over the twist φ, with the overlap
 //!
-//! x = φ + ½ √((φ − b)² + ε²) − ½ √((φ + b)² + ε²)
+//! x = φ − b φ / (|φ|^p + b^p)^(1/p)
 //!
-//! b half of the play, ε its rounding: for ε = 0 the dead zone, in which the coupling neither drags nor pulls; without play φ
-//! itself. β is Duffing's (G. Duffing, *Erzwungene Schwingungen*, 1918): rubber and clutch springs take more than in proportion.
+//! b half of the play, 1/p its rounding: for 1/p = 0 the dead zone, in which the coupling neither drags nor pulls. However round
+//! it is, it carries nothing in its middle (x′(0) = 0): what does is a spring.
+//!
+//! Spring: T_s = k (x + β x³) + d φ̇ with x = φ, and β of Duffing (G. Duffing, *Erzwungene Schwingungen*, 1918): rubber takes
+//! more than in proportion; or in two stages, as clutch springs do (E. J. Nestorides, *A Handbook on Torsional Vibration*, 1958):
+//! x = κ φ + (1 − κ) × the overlap with a dead zone, κ the share of the soft stage in the stiffness.
 
 use std::f64::consts::TAU;
 
@@ -21,11 +25,19 @@ const DAMPING_RATIO: [f64; 2] = [0.003, 1.5];
 const DISC_SHARE: [f64; 2] = [0.1, 0.9];
 /// From the width of some counts of an encoder to a loose key's.
 const GAP_RAD: [f64; 2] = [1e-4, 0.3];
+/// Share of a soft stage: less is play, more is one stage.
+const SOFT_SHARE: [f64; 2] = [0.02, 0.98];
+/// Rounding of play: at 1 it is felt all over the gap.
+const MOST_ROUNDING: f64 = 1.0;
 /// A coupling bends by no more than this many times what is plain, by half of it as a rule (deviation of the prior), and is
 /// looked for from a tenth.
 const MOST_BEND: f64 = 10.0;
 const BEND_SD: f64 = 0.5;
 const FIRST_BEND: f64 = 0.1;
+
+/// Names of the width of a dead zone and of a soft stage.
+const GAP: &str = "gap_rad";
+const SOFT_STAGE: &str = "soft_stage_rad";
 
 /// Numbers of a coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,11 +48,13 @@ pub struct Coupling {
     pub damping_ratio: f64,
     /// The disc's share of the inertia.
     pub disc_share: f64,
-    /// Width of the dead zone.
+    /// Width of the dead zone, or of the soft stage.
     pub gap_rad: f64,
     /// How it bends, a ratio: without play by how much more than in proportion a spring takes at the twist that it would have
-    /// under the usual torque, with play the rounding over half of that.
+    /// under the usual torque, with play its rounding.
     pub bend: f64,
+    /// Share of the soft stage in the stiffness; 0 where there is none.
+    pub soft_share: f64,
 }
 
 /// Torque over the twist, and what it acts between.
@@ -57,48 +71,81 @@ pub struct Law {
     pub half_gap: f64,
     damping: f64,
     rounding: f64,
+    soft_share: f64,
     hardening_per_rad2: f64,
 }
 
 impl Law {
-    fn overlap(&self, twist: f64) -> f64 {
-        let (b, e) = (self.half_gap, self.rounding);
-        if e > 0.0 {
-            twist + 0.5 * ((twist - b).hypot(e) - (twist + b).hypot(e))
-        } else {
-            (twist.abs() - b).max(0.0).copysign(twist)
+    /// Twist beyond the play, and its slope.
+    fn overlap(&self, twist: f64) -> (f64, f64) {
+        let b = self.half_gap;
+        if b == 0.0 {
+            return (twist, 1.0);
         }
+        if self.rounding == 0.0 {
+            let over = twist.abs() - b;
+            return if over > 0.0 { (over.copysign(twist), 1.0) } else { (0.0, 0.0) };
+        }
+        // With the smaller one of the ratio and its inverse: no power of it overflows.
+        let ratio = twist.abs() / b;
+        let least = ratio.min(ratio.recip());
+        let power = least.powf(self.rounding.recip());
+        let root = (1.0 + power).powf(-self.rounding);
+        let (held, slope) = if ratio < 1.0 { (ratio * root, 1.0) } else { (root, power / ratio) };
+        (b * (ratio - held).copysign(twist), 1.0 - slope * root / (1.0 + power))
     }
 
-    /// Slope of the overlap.
+    /// Share of the stiffness with which a further twist is met.
     pub fn slope(&self, twist: f64) -> f64 {
-        let (b, e) = (self.half_gap, self.rounding);
-        if e > 0.0 {
-            1.0 + 0.5 * ((twist - b) / (twist - b).hypot(e) - (twist + b) / (twist + b).hypot(e))
-        } else {
-            f64::from(u8::from(twist.abs() > b || b == 0.0))
-        }
+        self.soft_share + (1.0 - self.soft_share) * self.overlap(twist).1
     }
 
     /// T_s.
     pub fn torque(&self, twist: f64, rate: f64) -> f64 {
-        let x = self.overlap(twist);
-        let carried = self.stiffness * x * (1.0 + self.hardening_per_rad2 * x * x)
-            + self.damping * self.slope(twist) * rate;
+        let (overlap, slope) = self.overlap(twist);
+        let x = self.soft_share * twist + (1.0 - self.soft_share) * overlap;
+        let elastic = self.stiffness * x * (1.0 + self.hardening_per_rad2 * x * x);
+        if !self.is_play() {
+            return elastic + self.damping * rate;
+        }
+        let carried = elastic + self.damping * slope * rate;
         // What touches does not pull.
-        if self.half_gap > 0.0 && carried * x < 0.0 { 0.0 } else { carried }
+        if carried * x < 0.0 { 0.0 } else { carried }
+    }
+
+    /// Whether there is a dead zone.
+    pub fn is_play(&self) -> bool {
+        self.half_gap > 0.0 && self.soft_share == 0.0
     }
 }
 
 impl Coupling {
     /// A spring without play that takes in proportion.
     pub fn spring(mode_hz: f64, damping_ratio: f64, disc_share: f64) -> Self {
-        Self { mode_hz, damping_ratio, disc_share, gap_rad: 0.0, bend: 0.0 }
+        Self { mode_hz, damping_ratio, disc_share, gap_rad: 0.0, bend: 0.0, soft_share: 0.0 }
     }
 
     /// The same that bends a little.
     pub fn bent(&self) -> Self {
         Self { bend: FIRST_BEND, ..*self }
+    }
+
+    /// Springs of two stages to begin with whose torque is about this one's at the usual torque.
+    pub fn in_stages(&self, inertia: f64, usual_torque: f64) -> Vec<Self> {
+        let twist = usual_torque / self.law(inertia, usual_torque).stiffness;
+        // The second stage is the stiffer one: its mode is higher than that of both.
+        let of = |share: f64| Self {
+            mode_hz: 1.2 * self.mode_hz,
+            gap_rad: 2.0 * share * twist,
+            soft_share: 0.5,
+            ..*self
+        };
+        [0.25, 0.5, 1.0].map(of).to_vec()
+    }
+
+    /// Whether it has play.
+    pub fn is_play(&self) -> bool {
+        self.gap_rad > 0.0 && self.soft_share == 0.0
     }
 
     /// Its law where motor and disc have this inertia together.
@@ -115,7 +162,8 @@ impl Coupling {
             stiffness,
             half_gap,
             damping: 2.0 * self.damping_ratio * disc_inertia * omega,
-            rounding: self.bend * half_gap,
+            rounding: if self.is_play() { self.bend } else { 0.0 },
+            soft_share: self.soft_share,
             hardening_per_rad2: hardening * (stiffness / usual_torque.max(1e-12)).powi(2),
         }
     }
@@ -127,12 +175,14 @@ impl Coupling {
             && within(DAMPING_RATIO, self.damping_ratio)
             && within(DISC_SHARE, self.disc_share)
             && (self.gap_rad == 0.0 || within(GAP_RAD, self.gap_rad))
-            && within([0.0, MOST_BEND], self.bend)
+            && (self.soft_share == 0.0 || within(SOFT_SHARE, self.soft_share))
+            && within([0.0, if self.is_play() { MOST_ROUNDING } else { MOST_BEND }], self.bend)
     }
 
     /// Which coupling, in words.
     pub fn words(&self) -> String {
-        format!("{:.0} Hz, gap {:.2e} rad, bend {:.2}", self.mode_hz, self.gap_rad, self.bend)
+        let width = if self.soft_share > 0.0 { "soft stage" } else { "gap" };
+        format!("{:.0} Hz, {width} {:.2e} rad, bend {:.2}", self.mode_hz, self.gap_rad, self.bend)
     }
 
     /// Its law's numbers, with their names.
@@ -143,9 +193,11 @@ impl Coupling {
             ("disc_inertia_kg_m2", law.disc_inertia),
             ("mode_hz", self.mode_hz),
         ];
+        let width = if self.is_play() { GAP } else { SOFT_STAGE };
         let own = [
-            ("gap_rad", self.gap_rad),
-            ("gap_rounding_rad", law.rounding),
+            (width, self.gap_rad),
+            ("gap_rounding", law.rounding),
+            ("soft_stage_share", self.soft_share),
             ("hardening_per_rad2", law.hardening_per_rad2),
         ];
         let own = own.into_iter().filter(|(_, value)| *value > 0.0);
@@ -155,38 +207,38 @@ impl Coupling {
     /// The coupling that has these numbers.
     pub fn of_constants(constants: &[(String, f64)], inertia: f64, usual_torque: f64) -> Self {
         let get = |name: &str| constants.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
-        let (stiffness, mode_hz, gap_rad) = (get("stiffness_nm_per_rad"), get("mode_hz"), get("gap_rad"));
-        let bend = if gap_rad > 0.0 {
-            get("gap_rounding_rad") / (0.5 * gap_rad)
-        } else {
-            get("hardening_per_rad2") * (usual_torque / stiffness.max(1e-12)).powi(2)
-        };
+        let (stiffness, mode_hz) = (get("stiffness_nm_per_rad"), get("mode_hz"));
+        let hardening = get("hardening_per_rad2") * (usual_torque / stiffness.max(1e-12)).powi(2);
         Self {
             mode_hz,
             damping_ratio: get("damping_nm_s_per_rad") * std::f64::consts::PI * mode_hz
                 / stiffness.max(1e-12),
             disc_share: get("disc_inertia_kg_m2") / inertia,
-            gap_rad,
-            bend,
+            gap_rad: get(GAP).max(get(SOFT_STAGE)),
+            bend: get("gap_rounding").max(hardening),
+            soft_share: get("soft_stage_share"),
         }
     }
 
-    /// What is fitted: logarithms, so that a step is a ratio, and how it bends, which is a ratio.
+    /// What is fitted: logarithms, so that a step is a ratio, and what is a ratio.
     pub fn fitted(&self) -> Vec<f64> {
         let always = [self.mode_hz, self.damping_ratio, self.disc_share].map(f64::ln);
         let gap = (self.gap_rad > 0.0).then(|| self.gap_rad.ln());
-        always.into_iter().chain(gap).chain((self.bend > 0.0).then_some(self.bend)).collect()
+        let ratios = [self.bend, self.soft_share].into_iter().filter(|ratio| *ratio > 0.0);
+        always.into_iter().chain(gap).chain(ratios).collect()
     }
 
     /// A coupling of the same kind with these values.
     pub fn with(&self, p: &[f64]) -> Self {
-        let (gap, bend) = (self.gap_rad > 0.0, self.bend > 0.0);
+        let mut more = p[3..].iter().copied();
+        let mut own = |has: bool| if has { more.next().unwrap_or(0.0) } else { 0.0 };
         Self {
             mode_hz: p[0].exp(),
             damping_ratio: p[1].exp(),
             disc_share: p[2].exp(),
-            gap_rad: if gap { p[3].exp() } else { 0.0 },
-            bend: if bend { p[p.len() - 1] } else { 0.0 },
+            gap_rad: if self.gap_rad > 0.0 { own(true).exp() } else { 0.0 },
+            bend: own(self.bend > 0.0),
+            soft_share: own(self.soft_share > 0.0),
         }
     }
 
@@ -196,8 +248,9 @@ impl Coupling {
         let even = |[low, high]: [f64; 2]| (high / low).ln() / 12f64.sqrt();
         let always = [even(HERTZ), even(DAMPING_RATIO), even(DISC_SHARE)];
         let gap = (self.gap_rad > 0.0).then(|| even(GAP_RAD));
-        let sd: Vec<f64> =
-            always.into_iter().chain(gap).chain((self.bend > 0.0).then_some(BEND_SD)).collect();
+        let bend = (self.bend > 0.0).then_some(BEND_SD);
+        let soft = (self.soft_share > 0.0).then(|| 12f64.sqrt().recip());
+        let sd: Vec<f64> = always.into_iter().chain(gap).chain(bend).chain(soft).collect();
         log_occam(curvature, BALANCE_SHARE, &sd)
     }
 }
@@ -214,15 +267,16 @@ mod tests {
 
     #[test]
     fn its_constants_tell_all_of_it() {
-        for coupling in
-            [Coupling::spring(20.0, 0.1, 0.5), Coupling::spring(20.0, 0.1, 0.5).bent(), play(0.0), play(0.7)]
-        {
+        let spring = Coupling::spring(20.0, 0.1, 0.5);
+        let stages = spring.in_stages(0.6, USUAL_NM)[0];
+        for coupling in [spring, spring.bent(), stages, play(0.0), play(0.7)] {
             let constants = coupling.constants(&coupling.law(0.6, USUAL_NM));
             let told = Coupling::of_constants(&constants, 0.6, USUAL_NM);
             let (told, own) = (told.fitted(), coupling.fitted());
             assert_eq!(told.len(), own.len());
             assert!(told.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-9), "{told:?} {own:?}");
-            assert_eq!(coupling.with(&own).fitted().len(), own.len());
+            assert_eq!(coupling.with(&own).fitted(), own);
+            assert!(coupling.is_allowed());
         }
     }
 
@@ -236,16 +290,30 @@ mod tests {
     }
 
     #[test]
-    fn rounded_play_is_the_dead_zone_far_from_its_ends_and_its_slope_is_that_of_its_overlap() {
-        let [sharp, round] = [play(0.0), play(0.2)].map(|coupling| coupling.law(0.02, USUAL_NM));
+    fn a_spring_of_two_stages_is_soft_and_then_stiff() {
+        let stages = Coupling { gap_rad: 0.02, soft_share: 0.4, ..Coupling::spring(20.0, 0.1, 0.5) };
+        let law = stages.law(0.02, USUAL_NM);
+        assert!((law.torque(0.005, 0.0) / law.stiffness - 0.4 * 0.005).abs() < 1e-12);
+        assert!((law.torque(-0.03, 0.0) / law.stiffness + 0.4 * 0.03 + 0.6 * 0.02).abs() < 1e-12);
+        // It is a spring: it drags in its middle, and pulls.
+        assert!(law.torque(0.001, -1.0) < 0.0 && !stages.is_play());
+    }
+
+    #[test]
+    fn rounded_play_is_the_dead_zone_far_from_its_ends_and_carries_nothing_in_its_middle() {
+        let [sharp, round] = [play(0.0), play(0.5)].map(|coupling| coupling.law(0.02, USUAL_NM));
         assert_eq!([sharp.torque(0.009, 1.0), sharp.torque(-0.009, -1.0)], [0.0, 0.0]);
         assert!((sharp.torque(0.03, 0.0) - 0.02 * sharp.stiffness).abs() < 1e-9);
-        assert!((round.torque(0.2, 0.0) / sharp.torque(0.2, 0.0) - 1.0).abs() < 1e-3);
+        assert!((round.torque(0.5, 0.0) / sharp.torque(0.5, 0.0) - 1.0).abs() < 1e-3);
+        assert!(round.torque(0.001, 0.0) < 0.01 * 0.001 * round.stiffness && round.torque(0.01, 0.0) > 0.0);
         // Nothing pulls.
         assert_eq!(sharp.torque(0.0101, -100.0), 0.0);
-        for twist in [-0.03, -0.01, 0.0, 0.004, 0.011] {
-            let slope = (round.overlap(twist + 1e-6) - round.overlap(twist - 1e-6)) / 2e-6;
-            assert!((round.slope(twist) - slope).abs() < 1e-6, "{twist}");
+        for rounding in [0.02, 0.2, 0.5, 1.0] {
+            let law = play(rounding).law(0.02, USUAL_NM);
+            for twist in [-0.03, -0.01001, 0.004, 0.00999, 0.011, 3.0] {
+                let slope = (law.overlap(twist + 1e-7).0 - law.overlap(twist - 1e-7).0) / 2e-7;
+                assert!((law.slope(twist) - slope).abs() < 1e-3, "{twist}: {} {slope}", law.slope(twist));
+            }
         }
     }
 }

@@ -233,9 +233,6 @@ fn extended_residual(
         if let Some(added) = &form.response {
             response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
         }
-        for (place, column) in &form.replaces {
-            columns[*place] = column;
-        }
         if let Some(p) = p {
             columns.extend(form.columns.iter());
             values.extend_from_slice(p);

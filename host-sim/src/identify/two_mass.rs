@@ -89,7 +89,7 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &[f64], pull: f64) -> (Vec<f
         // In the gap the torque does not say where the disc is, but that it is at the other end where the motor says so.
         let off = if law.slope(twist) > STIFF {
             (out[i] - observed[i]) / k
-        } else if observed[i].abs() > sure {
+        } else if law.is_play() && observed[i].abs() > sure {
             twist - observed[i] / k - observed[i].signum() * law.half_gap
         } else {
             0.0
@@ -150,8 +150,8 @@ fn alternative(
     })
 }
 
-/// The best shapes of a coupling, the plain one and one that bends (a spring that hardens, play with rounded ends): a coarse
-/// grid, then a fit from its best points.
+/// The best shapes of a coupling: the plain one, one that bends (a spring that hardens, play with rounded ends), a spring of two
+/// stages. A coarse grid, then a fit from its best points.
 pub fn alternatives_of_grid(
     effect: &'static str,
     view: &DriveView<'_>,
@@ -162,11 +162,10 @@ pub fn alternatives_of_grid(
     if !view.rotary || view.inertia <= 0.0 || coupled {
         return Vec::new();
     }
-    let found = match view.fixed {
-        Some(fixed) => [of_constants(effect, view, fixed), None],
+    match view.fixed {
+        Some(fixed) => of_constants(effect, view, fixed).into_iter().collect(),
         None => searched(effect, view, &grid),
-    };
-    found.into_iter().flatten().collect()
+    }
 }
 
 /// The coupling with the numbers that were found on other logs.
@@ -187,8 +186,8 @@ fn stated(
     Some(reckoned(view, numbers, bearing, form))
 }
 
-/// The best plain coupling of a grid, and the best one that bends.
-fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> [Option<Alternative>; 2] {
+/// The best plain coupling of a grid, and where one is asked for the best of each other shape.
+fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Vec<Alternative> {
     let trial = |numbers: &Coupling, bearing: &[f64], pull: f64| -> Option<Trial> {
         let alternative = alternative(effect, view, numbers, bearing, pull)?;
         let solved = view.balance.solve_forms(&joined(view, &alternative));
@@ -208,7 +207,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> [O
     };
     let sharpened = |mut best: (Trial, f64)| -> Option<Alternative> {
         let bearing = view.balance.bearing(&joined(view, &best.0.alternative));
-        let weaker = if best.0.numbers.gap_rad > 0.0 { &[][..] } else { &WEAKER };
+        let weaker = if best.0.numbers.is_play() { &[][..] } else { &WEAKER };
         for pull in weaker {
             let start = trial(&best.0.numbers, &bearing, *pull);
             let Some(better) = start.and_then(|start| refined_by(start, &bearing, *pull)) else { break };
@@ -231,12 +230,18 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> [O
         tried.truncate(STARTS);
         tried
     };
-    let Some(plain) = best_of(starts(false), &bearing) else { return [None, None] };
+    let Some(plain) = best_of(starts(false), &bearing) else { return Vec::new() };
     let nothing = view.balance.solve_forms(view.company.forms).log_evidence;
     if plain.0.solved.log_evidence + plain.1 < nothing {
         // Where nothing asks for a coupling, its numbers are of no account.
-        return [made(plain, &bearing), None];
+        return made(plain, &bearing).into_iter().collect();
     }
+    let staged = if plain.0.numbers.is_play() {
+        None
+    } else {
+        let stages = plain.0.numbers.in_stages(view.inertia, view.scales.effort);
+        best_of(stages.par_iter().filter_map(|numbers| trial(numbers, &bearing, PULL)).collect(), &bearing)
+    };
     let bent = best_of(starts(true), &bearing);
     // Over the edge of a dead zone the likelihood is rough, and over a rounded one it is not: what was found there is a start too.
     let unbent = bent.as_ref().and_then(|(bent, _)| {
@@ -244,7 +249,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> [O
         best_of(vec![start], &bearing)
     });
     let plain = unbent.into_iter().fold(plain, better);
-    [sharpened(plain), bent.and_then(sharpened)]
+    [Some(plain), bent, staged].into_iter().flatten().filter_map(sharpened).collect()
 }
 
 /// With the disc's motion in each way.
@@ -393,7 +398,7 @@ mod tests {
         )
     }
 
-    /// Numbers of the better one of the two forms.
+    /// Numbers of the best form.
     fn found(effect: &'static str, log: DriveLog, grid: &[Coupling]) -> Vec<(String, f64)> {
         let logs = [log];
         let scales = DriveScales::new(&logs);
@@ -409,7 +414,7 @@ mod tests {
             inertia: INERTIA_KG_M2,
             fixed: None,
         };
-        let forms = searched(effect, &view, grid).into_iter().flatten();
+        let forms = searched(effect, &view, grid).into_iter();
         let best = forms.max_by(|a, b| {
             let evidence = |form: &Alternative| balance.solve_forms(&[form]).log_evidence;
             evidence(a).total_cmp(&evidence(b))
@@ -430,6 +435,20 @@ mod tests {
         let found = found("shaft_torsion", log, &grid);
         assert_near(&found, "stiffness_nm_per_rad", k, 0.03);
         assert_near(&found, "hardening_per_rad2", beta, 0.15);
+    }
+
+    #[test]
+    fn a_spring_of_two_stages_is_found_with_its_soft_one() {
+        let (k, soft, half, d) = (260.0, 0.45, 0.012, 0.1);
+        let log = log(|twist: f64, rate| {
+            let beyond = (twist.abs() - half).max(0.0) * twist.signum();
+            k * (soft * twist + (1.0 - soft) * beyond) + d * rate
+        });
+        let grid = [Coupling::spring(17.0, 0.03, 0.65), Coupling::spring(34.0, 0.03, 0.65)];
+        let found = found("shaft_torsion", log, &grid);
+        assert_near(&found, "stiffness_nm_per_rad", k, 0.05);
+        assert_near(&found, "soft_stage_share", soft, 0.1);
+        assert_near(&found, "soft_stage_rad", 2.0 * half, 0.1);
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! `lever_hysteresis`: normal force lags M1 torque by a Coulomb band.
 
-use super::{About, Effect, NormalLoadView};
+use super::stops::{Stops, stop};
+use super::{About, Effect, NormalLoadLog, NormalLoadView};
 use crate::identify::balance::Alternative;
-use crate::identify::term::Parameter;
+use crate::identify::filters::adaptively_smoothed;
 
 /// The effect.
 pub(super) struct LeverHysteresis;
@@ -10,20 +11,8 @@ pub(super) struct LeverHysteresis;
 /// The two forms, by what their widths are relative to.
 const FORCE: &str = "usual_force_n";
 const TORQUE: &str = "usual_torque_nm";
-/// Widths of the play, in shares of the usual force or torque.
-const WIDTHS: [f64; 7] = [0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64];
-
-/// A play operator: follows its input at a distance of at most `width`.
-pub(in crate::identify) fn play(values: &[f64], width: f64) -> Vec<f64> {
-    let mut state = values.first().copied().unwrap_or(0.0);
-    values
-        .iter()
-        .map(|x| {
-            state = state.clamp(x - width, x + width);
-            state
-        })
-        .collect()
-}
+/// Shortest and longest width of the play, in shares of the usual force or torque.
+const WIDTHS: [f64; 2] = [0.01, 0.64];
 
 impl Effect for LeverHysteresis {
     fn about(&self) -> About {
@@ -38,32 +27,31 @@ impl Effect for LeverHysteresis {
         let s = view.scales;
         // The joints yield with the force that they carry, or with the torque before them: the force rings after a step,
         // the torque does not.
-        let over = |form: &str, usual: f64, signal: &dyn Fn(&super::NormalLoadLog) -> Vec<f64>| {
-            let column = |share: f64| -> Vec<f64> {
-                let width = share * usual;
-                let of = |log: &super::NormalLoadLog| {
-                    let values = signal(log);
-                    let follows = play(&values, width);
-                    values.iter().zip(follows).map(|(x, q)| (x - q) / width).collect::<Vec<f64>>()
-                };
-                view.logs.iter().flat_map(of).collect()
+        let over = |form: &str, usual: f64, signal: &dyn Fn(&NormalLoadLog) -> (&[f64], f64)| {
+            // A stop remembers peaks: noise makes some, and a filter that is the same everywhere cuts those that are.
+            let denoised = |log: &NormalLoadLog| adaptively_smoothed(signal(log).0, signal(log).1);
+            let signals: Vec<Vec<f64>> = view.logs.iter().map(denoised).collect();
+            let column = |width: f64| {
+                let of = |(log, signal): (&NormalLoadLog, &Vec<f64>)| log.filtered(&stop(signal, width));
+                view.logs.iter().zip(&signals).flat_map(of).collect()
             };
-            let parameters = WIDTHS.map(|w| Parameter::positive(format!("band_{w}_nm"), 0.5 * s.torque_nm)).to_vec();
-            Alternative {
-                form: form.into(),
-                // Which of the forms, as a constant: held-out logs take the one that was found.
-                constants: vec![(form.into(), usual)],
-                ..Alternative::columns(self.id(), parameters, WIDTHS.map(column).to_vec())
-            }
+            let stops = Stops { effect: self.id(), size: 0.5 * s.torque_nm, column: &column };
+            let found = match view.fixed {
+                Some(fixed) => stops.of_constants(fixed),
+                None => stops.searched(view.balance, view.company, WIDTHS.map(|share| share * usual)),
+            };
+            let mut constants = found.constants;
+            // Which of the forms, as a constant: held-out logs take the one that was found.
+            constants.push((form.into(), usual));
+            Alternative { form: form.into(), constants, ..found }
         };
         let wanted = |form: &str| view.fixed.is_none_or(|fixed| fixed.iter().any(|(name, _)| name == form));
-        let usual = |form: &str, now: f64| view.fixed.and_then(|f| f.iter().find(|(n, _)| n == form)).map_or(now, |f| f.1);
         let mut all = Vec::new();
         if wanted(FORCE) {
-            all.push(over(FORCE, usual(FORCE, s.load_n), &|log| log.filtered_n.clone()));
+            all.push(over(FORCE, s.load_n, &|log| (&log.normal_n, log.normal_noise_n)));
         }
         if wanted(TORQUE) {
-            all.push(over(TORQUE, usual(TORQUE, s.torque_nm), &|log| log.filtered(&log.torque_nm)));
+            all.push(over(TORQUE, s.torque_nm, &|log| (&log.torque_nm, log.torque_noise_nm)));
         }
         all
     }

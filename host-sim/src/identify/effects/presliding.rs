@@ -1,18 +1,19 @@
 //! `presliding`: the bearing yields elastically before it slides (reversals).
 
+use super::stops::{Stops, stop};
 use super::waves::travel;
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
-use crate::identify::drive::{COULOMB, direction};
-use crate::identify::term::Parameter;
+use crate::identify::drive::{DriveLog, direction};
 
 /// The effect.
 pub(super) struct Presliding;
 
-/// Yield lengths that are tried, in shares of the travel, a factor of two apart; and in radians at most.
-const LENGTHS: usize = 9;
-/// The longest, in shares of the travel between reversals.
+/// The longest way over which it yields, in shares of the travel, or of what is no travel between reversals any more, rad; and the
+/// shortest, in shares of the longest.
 const LONGEST: f64 = 0.1;
+const LONGEST_TRAVEL_RAD: f64 = 3.0;
+const SHORTEST: f64 = 1.0 / 128.0;
 
 impl Effect for Presliding {
     fn about(&self) -> About {
@@ -25,34 +26,20 @@ impl Effect for Presliding {
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let reach = view.logs.iter().map(|log| travel(log.position.iter().copied())).fold(0.0, f64::max);
-        let longest = LONGEST * if view.rotary { reach.min(3.0) } else { reach };
-        let shape = |length: f64| {
-            // Dahl's spring: it follows the motion and fades towards the direction's sign.
-            let state: Vec<f64> = view
-                .logs
-                .iter()
-                .flat_map(|log| {
-                    let (mut z, mut last) = (0.0, log.position[0]);
-                    let follow = |x: &f64| {
-                        let moved = (x - last) / length;
-                        last = *x;
-                        z = if moved.abs() > 0.0 { (z - moved.signum()) * (-moved.abs()).exp() + moved.signum() } else { z };
-                        z
-                    };
-                    let state: Vec<f64> = log.position.iter().map(follow).collect();
-                    log.filtered(&state)
-                })
-                .collect();
-            let sliding = view.logs.iter().flat_map(|log| direction(log, view.scales.speed)).collect();
-            Alternative {
-                form: format!("over {length:.2e}"),
-                constants: vec![("yield_length".to_string(), length)],
-                replaces: vec![(COULOMB, state)],
-                log_prior: -(LENGTHS as f64).ln(),
-                ..Alternative::columns("presliding", vec![Parameter::amplitude("sliding_at_once", view.scales.own)], vec![sliding])
-            }
+        let longest = LONGEST * if view.rotary { reach.min(LONGEST_TRAVEL_RAD) } else { reach };
+        // By how much less than at once it slides.
+        let column = |way: f64| {
+            let of = |log: &DriveLog| {
+                let at_once = direction(log, view.scales.speed);
+                let carried = log.filtered(&stop(&log.position, way));
+                carried.iter().zip(at_once).map(|(y, s)| y - s).collect::<Vec<f64>>()
+            };
+            view.logs.iter().flat_map(of).collect()
         };
-        let grid = (0..LENGTHS).map(|i| longest * 0.5f64.powi(i as i32)).collect();
-        super::shapes(view.fixed, "yield_length", grid).into_iter().map(shape).collect()
+        let stops = Stops { effect: self.id(), size: view.scales.own, column: &column };
+        vec![match view.fixed {
+            Some(fixed) => stops.of_constants(fixed),
+            None => stops.searched(view.balance, view.company, [SHORTEST * longest, longest]),
+        }]
     }
 }
