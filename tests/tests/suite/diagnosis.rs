@@ -109,6 +109,13 @@ mod long {
         named(&[Effect::StaticAgeing], 205, Base::Series);
     }
 
+    /// The elements have just touched where each log begins: the first breakaway is not that of a contact that is a second old.
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn how_old_the_contact_is_at_first_is_no_wear() {
+        named(&[Effect::StaticAgeing], 205_010_006, Base::Series);
+    }
+
     #[test]
     #[ignore = "long: cargo verify runs it"]
     fn cogging_is_named_with_its_orders() {
