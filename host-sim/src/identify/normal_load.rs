@@ -7,7 +7,9 @@
 
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
-use super::filters::{derivative_of_motion, gaussian, largest_change, local_maximum, rms, white_share};
+use super::filters::{
+    adaptively_smoothed, derivative_of_motion, gaussian, largest_change, local_maximum, rms, white_share,
+};
 use super::noise;
 use super::term::Parameter;
 use crate::files::rig_file::RigFile;
@@ -36,7 +38,7 @@ pub struct NormalLoadLog {
     pub angle_rad: Option<Vec<f64>>,
     /// Normal force, N.
     pub normal_n: Vec<f64>,
-    /// The same through the filter.
+    /// The same without its noise, through the filter.
     pub filtered_n: Vec<f64>,
     /// Time since the log's start, s.
     pub time_s: Vec<f64>,
@@ -52,13 +54,16 @@ impl NormalLoadLog {
     /// The normal-load actuator of a contact log; `None` where M1's torque is not logged.
     pub fn new(log: &ContactLog) -> Option<Self> {
         let torque_nm = log.m1_torque_nm.clone()?;
+        let normal_noise_n = noise::standard_deviation(&log.normal_n);
+        // Its noise would make a smaller gain look better where levels do not tell it, and pay for what makes up for that.
+        let smoothed_n = adaptively_smoothed(&log.normal_n, normal_noise_n);
         Some(Self {
             step_s: log.grid.step_s,
             torque_noise_nm: noise::standard_deviation(&torque_nm),
-            normal_noise_n: noise::standard_deviation(&log.normal_n),
+            normal_noise_n,
             torque_nm,
             angle_rad: log.m1_angle_rad.clone(),
-            filtered_n: gaussian(&log.normal_n, WIDTH, 0),
+            filtered_n: gaussian(&smoothed_n, WIDTH, 0),
             normal_n: log.normal_n.clone(),
             time_s: log.grid.time_s.clone(),
             usable: log.usable.clone(),
@@ -180,4 +185,41 @@ fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> Log
     let touching = TOUCHING * scales.load_n;
     let left_out = log.filtered_n.iter().zip(&log.usable).map(|(n, used)| *n < touching || !used).collect();
     LogRows { width: WIDTH, step_s: log.step_s, left_out, noise: Box::new(noise) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::signal::Signal;
+    use crate::identify::balance::Alternative;
+    use crate::identify::noise::tests::white;
+    use crate::identify::table::LOG_PRIOR;
+
+    /// Two levels, held in turn, and a cause that could make up for any gain between them.
+    #[test]
+    fn noise_of_the_normal_force_is_no_reason_for_a_smaller_gain() {
+        const COUNT: usize = 8000;
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let high = |i: usize| (i / 2000).is_multiple_of(2);
+        let torque = |i: usize| if high(i) { 3.2 } else { 0.5 };
+        let series = |of: &dyn Fn(usize) -> f64| (0..COUNT).map(of).collect::<Vec<f64>>();
+        let noise = [1, 2].map(|seed| white(COUNT, seed));
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, series(&|i| 1e-3 * i as f64));
+        log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
+        log.set_signal(Signal::M1Torque, series(&|i| torque(i) + 0.007 * noise[0][i]));
+        let force = |i: usize| rig.lever_gain_n_per_nm * torque(i) - rig.preload_n;
+        log.set_signal(Signal::NormalForce, series(&|i| force(i) + 0.25 * noise[1][i]));
+        log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
+        let logs = [NormalLoadLog::new(&ContactLog::new(&log, &rig).unwrap()).unwrap()];
+        let balance = balance(&logs, &rig, &NormalLoadScales::new(&logs));
+        let step = logs[0].filtered(&series(&|i| f64::from(u8::from(high(i)))));
+        let apart =
+            Alternative::columns("foil_hardening", vec![Parameter::amplitude("step", 2.0)], vec![step]);
+        let [none, with] = [&[][..], &[&apart][..]].map(|forms| balance.solve_forms(forms));
+        // It gains less than a cause's prior asks for.
+        let gained = with.log_evidence - none.log_evidence;
+        assert!(gained < -LOG_PRIOR, "{gained}");
+    }
 }

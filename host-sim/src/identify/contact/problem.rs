@@ -243,12 +243,19 @@ impl<'a> Problem<'a> {
 
     /// What the terms change.
     pub fn change(&self, terms: &[usize], p: &[f64]) -> Change {
+        self.change_but(terms, p, None)
+    }
+
+    /// What the terms change but for one.
+    fn change_but(&self, terms: &[usize], p: &[f64], out: Option<usize>) -> Change {
         let mut change = Change::default();
         let mut at = self.baseline.free.len();
         for &term in terms {
-            let count = self.terms[term].parameters.len();
-            (self.terms[term].act)(&p[at..at + count], &mut change);
-            at += count;
+            let own = at..at + self.terms[term].parameters.len();
+            at = own.end;
+            if out != Some(term) {
+                (self.terms[term].act)(&p[own], &mut change);
+            }
         }
         change
     }
@@ -363,7 +370,7 @@ impl<'a> Problem<'a> {
     /// −ln likelihood, but for constants.
     pub fn misfit(&self, r: &[f64]) -> f64 {
         // The logarithm of a product in place of a sum of logarithms.
-        let each = r.chunks(4).map(|r| r.iter().map(|r| 1.0 + r * r / FREEDOM).product::<f64>().ln());
+        let each = r.chunks(8).map(|r| r.iter().map(|r| 1.0 + r * r / FREEDOM).product::<f64>().ln());
         0.5 * (FREEDOM + 1.0) * each.sum::<f64>() / self.noise.temper
     }
 
@@ -376,11 +383,14 @@ impl<'a> Problem<'a> {
     /// Slopes that change little while other parameters move: those of the baseline, and of ln friction as a whole.
     pub fn slopes(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Slopes {
         const STEP: f64 = 0.01;
+        let mut change = self.change(terms, p);
         let base = (0..self.baseline.free.len())
             .into_par_iter()
-            .map(|i| self.difference(terms, p, r, i, self.baseline.free[i].parameter.step))
+            // What the terms change is the same.
+            .map(|i| {
+                self.difference(p, r, i, self.baseline.free[i].parameter.step, |_| Cow::Borrowed(&change))
+            })
             .collect();
-        let mut change = self.change(terms, p);
         match &mut change.log_factor {
             Some(m) => m.iter_mut().flatten().for_each(|m| *m += STEP),
             none => *none = Some(self.logs.iter().map(|log| vec![STEP; log.len()]).collect()),
@@ -389,10 +399,19 @@ impl<'a> Problem<'a> {
         Slopes { base, gain: moved.iter().zip(r).map(|(a, b)| (b - a) / STEP).collect() }
     }
 
-    fn difference(&self, terms: &[usize], p: &[f64], r: &[f64], i: usize, step: f64) -> Vec<f64> {
+    /// Slope along one value, by what the terms change there.
+    fn difference<'c>(
+        &self,
+        p: &[f64],
+        r: &[f64],
+        i: usize,
+        step: f64,
+        change: impl Fn(&[f64]) -> Cow<'c, Change>,
+    ) -> Vec<f64> {
         let mut q = p.to_vec();
         q[i] += step;
-        self.residuals(terms, &q).iter().zip(r).map(|(a, b)| (b - a) / step).collect()
+        let moved = self.scaled(&self.predict_changed(&change(&q), &q));
+        moved.iter().zip(r).map(|(a, b)| (b - a) / step).collect()
     }
 
     /// As [`Self::jacobian`], with slopes taken near by.
@@ -420,20 +439,27 @@ impl<'a> Problem<'a> {
         terms: &[usize],
         p: &[f64],
         r: &[f64],
-        term: usize,
+        place: usize,
         at: usize,
     ) -> Vec<Vec<f64>> {
-        let term = &self.terms[term];
+        let term = &self.terms[place];
         match &term.columns {
             // All columns of ln friction act through one gain.
             Some(own) => own
                 .iter()
                 .map(|c| c.iter().flatten().zip(&slopes.gain).map(|(x, g)| x * g).collect())
                 .collect(),
-            None => (0..term.parameters.len())
-                .into_par_iter()
-                .map(|i| self.difference(terms, p, r, at + i, term.parameters[i].step))
-                .collect(),
+            None => {
+                let others = self.change_but(terms, p, Some(place));
+                let own = at..at + term.parameters.len();
+                let moved = |q: &[f64]| {
+                    let mut change = others.clone();
+                    (term.act)(&q[own.clone()], &mut change);
+                    Cow::Owned(change)
+                };
+                let column = |i: usize| self.difference(p, r, at + i, term.parameters[i].step, moved);
+                (0..term.parameters.len()).into_par_iter().map(column).collect()
+            }
         }
     }
 

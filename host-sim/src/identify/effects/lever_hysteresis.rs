@@ -1,6 +1,7 @@
 //! `lever_hysteresis`: normal force lags M1 torque by a Coulomb band.
 
 use super::stops::{Stops, stop};
+use super::waves::travel;
 use super::{About, Effect, NormalLoadLog, NormalLoadView};
 use crate::identify::balance::Alternative;
 use crate::identify::filters::adaptively_smoothed;
@@ -11,8 +12,10 @@ pub(super) struct LeverHysteresis;
 /// The two forms, by what their widths are relative to.
 const FORCE: &str = "usual_force_n";
 const TORQUE: &str = "usual_torque_nm";
-/// Shortest and longest width of the play, in shares of the usual force or torque.
-const WIDTHS: [f64; 2] = [0.01, 0.64];
+/// Shortest width of the play, in shares of the usual force or torque; the longest, of what it goes over: a wider one slides both
+/// ways on less than half of it, and is a spring.
+const SHORTEST: f64 = 0.01;
+const LONGEST: f64 = 0.25;
 
 impl Effect for LeverHysteresis {
     fn about(&self) -> About {
@@ -35,10 +38,12 @@ impl Effect for LeverHysteresis {
                 let of = |(log, signal): (&NormalLoadLog, &Vec<f64>)| log.filtered(&stop(signal, width));
                 view.logs.iter().zip(&signals).flat_map(of).collect()
             };
+            let goes_over = signals.iter().map(|signal| travel(signal.iter().copied())).fold(0.0, f64::max);
+            let longest = LONGEST * goes_over.max(usual);
             let stops = Stops { effect: self.id(), size: 0.5 * s.torque_nm, column: &column };
             let found = match view.fixed {
                 Some(fixed) => stops.of_constants(fixed),
-                None => stops.searched(view.balance, view.company, WIDTHS.map(|share| share * usual)),
+                None => stops.searched(view.balance, view.company, [SHORTEST * usual, longest]),
             };
             let mut constants = found.constants;
             // Which of the forms, as a constant: held-out logs take the one that was found.
