@@ -118,10 +118,12 @@ fn draw_panel(
             axes.draw_series([Polygon::new(points, colour.mix(BAND))])?;
             continue;
         }
-        if !chart.counts.is_empty() {
+        // Means of what was measured stand against a law as points, the law as a line.
+        let measured = line.role == Role::Measured;
+        let alone = panel.lines.len() == 1;
+        if !chart.counts.is_empty() && (measured || alone) {
             axes.draw_series(points.iter().map(|point| Circle::new(*point, 3, colour.filled())))?;
-            // Means of what was measured stand against a law as points.
-            if line.role == Role::Measured && panel.lines.len() > 1 {
+            if !alone {
                 continue;
             }
         }
@@ -130,12 +132,10 @@ fn draw_panel(
     Ok(())
 }
 
-/// A colour for each line; a band has that of the last line, whose band it is.
+/// A colour for each line; a band has that of the line after it, whose band it is.
 fn colours(panel: &Panel) -> Vec<RGBColor> {
-    let mut own = COLOURS.into_iter().cycle();
-    let lines = panel.lines.iter().filter(|line| line.role != Role::Band).count();
-    let last = COLOURS[lines.saturating_sub(1) % COLOURS.len()];
-    let of = |line: &Line| if line.role == Role::Band { Some(last) } else { own.next() };
+    let mut own = COLOURS.into_iter().cycle().peekable();
+    let of = |line: &Line| if line.role == Role::Band { own.peek().copied() } else { own.next() };
     panel.lines.iter().filter_map(of).collect()
 }
 

@@ -58,7 +58,8 @@
   function mode(chart, t) {
     if (!chart.counts.length || t.role === "band") return "lines";
     const alone = chart.traces.filter((other) => other.row === t.row).length === 1;
-    return t.role === "measured" && !alone ? "markers" : "lines+markers";
+    if (alone) return "lines+markers";
+    return t.role === "measured" ? "markers" : "lines";
   }
 
   function traces(chart, c) {

@@ -40,7 +40,13 @@ impl Effect for LeverHysteresis {
             };
             let goes_over = signals.iter().map(|signal| travel(signal.iter().copied())).fold(0.0, f64::max);
             let longest = LONGEST * goes_over.max(usual);
-            let stops = Stops { effect: self.id(), size: 0.5 * s.torque_nm, column: &column };
+            let within = if form == FORCE { "force within the band, N" } else { "torque within the band, N m" };
+            let stops = Stops {
+                effect: self.id(),
+                size: 0.5 * s.torque_nm,
+                column: &column,
+                deflection: Some(within),
+            };
             let found = match view.fixed {
                 Some(fixed) => stops.of_constants(fixed),
                 None => stops.searched(view.balance, view.company, [SHORTEST * usual, longest]),

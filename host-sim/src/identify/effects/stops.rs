@@ -34,6 +34,8 @@ pub(super) struct Stops<'s> {
     pub(super) size: f64,
     /// Columns of a width over all rows.
     pub(super) column: &'s dyn Fn(f64) -> Vec<f64>,
+    /// What a column is, times its width, with its unit, where it is the stop's own deflection.
+    pub(super) deflection: Option<&'s str>,
 }
 
 impl Stops<'_> {
@@ -67,28 +69,38 @@ impl Stops<'_> {
     ) -> Alternative {
         let count = ((longest / shortest).ln() / COARSE.ln()).round() as i32;
         let coarse: Vec<f64> = (0..=count).map(|i| longest * COARSE.powi(-i)).collect();
-        let asked_for = |widths: &[f64]| -> Vec<f64> {
+        // Those with a size, and that of the largest.
+        let asked_for = |widths: &[f64]| -> (Vec<f64>, Option<f64>) {
             let form = self.of_widths(widths);
             let forms: Vec<&Alternative> = company.forms.iter().copied().chain([&form]).collect();
             let solved = balance.solve_forms(&forms);
             let own = &solved.p[solved.p.len() - widths.len()..];
-            widths.iter().zip(own).filter(|(_, size)| **size > 0.0).map(|(width, _)| *width).collect()
+            let sized = || widths.iter().zip(own).filter(|(_, size)| **size > 0.0);
+            let largest = sized().max_by(|a, b| a.1.total_cmp(b.1)).map(|(width, _)| *width);
+            (sized().map(|(width, _)| *width).collect(), largest)
         };
         let about = |width: &f64| {
             let width = *width;
             (1 - FINE..FINE).map(move |step| width * COARSE.powf(f64::from(step) / f64::from(FINE)))
         };
         let mut fine: Vec<f64> =
-            asked_for(&coarse).iter().flat_map(about).filter(|w| *w <= longest).collect();
+            asked_for(&coarse).0.iter().flat_map(about).filter(|w| *w <= longest).collect();
         fine.sort_by(|a, b| b.total_cmp(a));
         fine.dedup_by(|a, b| *a > 0.999 * *b);
-        let found = asked_for(&fine);
+        let (found, largest) = asked_for(&fine);
         if found.is_empty() {
             return self.of_widths(&coarse);
         }
         let candidates = f64::from(FINE * (count + 1));
-        // The widths were chosen among so many.
-        Alternative { log_prior: -(found.len() as f64) * candidates.ln(), ..self.of_widths(&found) }
+        let follows = |(name, width): (&str, f64)| {
+            (name.to_string(), (self.column)(width).iter().map(|share| width * share).collect())
+        };
+        Alternative {
+            // The widths were chosen among so many.
+            log_prior: -(found.len() as f64) * candidates.ln(),
+            coordinate: self.deflection.zip(largest).map(follows),
+            ..self.of_widths(&found)
+        }
     }
 }
 
@@ -118,7 +130,12 @@ mod tests {
             noise: Box::new(|_| vec![0.005]),
         };
         let balance = Balance::new(y, vec![(Parameter::amplitude("gain", 10.0), x.clone())], &[log], 1.0);
-        let stops = Stops { effect: "lever_hysteresis", size: 0.5, column: &|width| stop(&x, width) };
+        let stops = Stops {
+            effect: "lever_hysteresis",
+            size: 0.5,
+            column: &|width| stop(&x, width),
+            deflection: None,
+        };
         let alone = Company { forms: &[], residual: &balance.response };
         let found = stops.searched(&balance, alone, [0.01, 0.64]);
         let solved = balance.solve_forms(&[&found]);
