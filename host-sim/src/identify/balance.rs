@@ -380,6 +380,16 @@ pub struct Company<'a> {
     pub residual: &'a [f64],
 }
 
+impl<'a> Company<'a> {
+    /// The forms, and this one beside them.
+    pub fn with<'f>(&self, form: &'f Alternative) -> Vec<&'f Alternative>
+    where
+        'a: 'f,
+    {
+        self.forms.iter().copied().chain([form]).collect()
+    }
+}
+
 /// The forms that were looked for, and sets of them with their evidence, best first; the empty set is among them.
 ///
 /// Orders and shapes are looked for where nothing else stands, and once more beside what was found: a mode that was fitted

@@ -76,7 +76,7 @@ pub fn diagnose(
                 extended = extended.fitted(model, rig, train, &|| ());
             }
             values.extend(extended.values);
-            drawn.insert(0, Drawn::of_contact(contact, &extended.fit));
+            drawn.insert(0, Drawn::of_contact(contact, &extended.laws));
             extended.model.to_toml() + &extended_model::remarks(&judgement)
         }
         None => extended_model::drive_text(&judgement),

@@ -3,12 +3,16 @@
 //! What is measured less all of the answer but one cause should lie on that cause's law. It is drawn in bins of the
 //! coordinate that the law follows most, or over time where it follows none.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::balance::Alternative;
 use super::contact::problem::Fit;
 use super::contact::search;
 use super::contact_part::{ContactPart, coordinates_of};
+use super::effects::coordinates::TIME;
+use super::extended_model::FittedLaws;
 use super::filters::rms;
 use super::linear_part::Linear;
 use super::table::Part;
@@ -17,8 +21,6 @@ use crate::fit::covariance::INTERVAL_95;
 use crate::report::bins::Bins;
 use crate::report::chart::{Chart, Line, Panel, Role, Window};
 
-/// The coordinate by which a log's points are told.
-const TIME: &str = "time, s";
 /// A law follows a coordinate that explains this share of its variance.
 const FOLLOWS: f64 = 0.5;
 /// What is less than this share of its usual size is nothing that a law could be relative to.
@@ -51,8 +53,6 @@ pub struct Drawn {
     unit: &'static str,
     /// What may be followed, with units.
     coordinates: Vec<(String, Vec<f64>)>,
-    /// Time within its log, s.
-    time_s: Vec<f64>,
     /// Points that count.
     rows: Vec<usize>,
     /// What the baseline and what the answer leaves.
@@ -65,25 +65,26 @@ impl Drawn {
     pub fn of_balance(part: Part, linear: &Linear, place: usize) -> Self {
         let (balance, solved) = (&linear.balance, &linear.solved[place]);
         let none = linear.solved.iter().find(|s| s.set.is_empty()).unwrap_or(solved);
-        let component = |(form, own): (&Alternative, std::ops::Range<usize>)| {
-            let (places, columns): (Vec<usize>, Vec<Vec<f64>>) = (own.collect(), form.columns.clone());
+        let component = |(form, own): (&Alternative, Range<usize>)| {
             let mut values = form.response.as_ref().map_or_else(
                 || vec![0.0; balance.response.len()],
                 |added| added.iter().map(|added| -added).collect(),
             );
-            for (place, column) in places.iter().zip(&columns) {
-                values.iter_mut().zip(column).for_each(|(v, x)| *v += solved.p[*place] * x);
+            for (p, column) in solved.p[own.clone()].iter().zip(&form.columns) {
+                values.iter_mut().zip(column).for_each(|(v, x)| *v += p * x);
             }
-            let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
-                solved.covariance[(places[i], places[j])]
-            });
-            let coordinate = form.coordinate.clone();
-            Component { effect: form.effect, values, columns, covariance, coordinate, relative_to: None }
+            Component {
+                effect: form.effect,
+                values,
+                columns: form.columns.clone(),
+                covariance: block(&solved.covariance, &own),
+                coordinate: form.coordinate.clone(),
+                relative_to: None,
+            }
         };
         Self {
             part,
             unit: linear.unit,
-            time_s: linear.coordinates.iter().find(|c| c.0 == TIME).map_or(Vec::new(), |c| c.1.clone()),
             coordinates: linear.coordinates.clone(),
             rows: balance.used.clone(),
             left: [none.residual.clone(), solved.residual.clone()],
@@ -92,7 +93,8 @@ impl Drawn {
     }
 
     /// The contact with a fit of its answer and the covariance of that.
-    pub fn of_contact(contact: &ContactPart, (fit, covariance): &(Fit, DMatrix<f64>)) -> Self {
+    pub fn of_contact(contact: &ContactPart, laws: &FittedLaws) -> Self {
+        let FittedLaws { fit, columns, covariance } = laws;
         let problem = contact.problem();
         let deviation = &problem.noise.deviation;
         let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map_or(fit, |r| &r.fit);
@@ -100,7 +102,6 @@ impl Drawn {
         let limit = problem.well_known_nm();
         let friction_nm: Vec<f64> =
             contact.logs.iter().flat_map(|log| log.smooth_nm.iter().copied()).collect();
-        let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
         let mut from = contact.baseline.free.len();
         let without = search::without_each_as_they_are(&problem, fit);
         let component = |(term, without): (&usize, &Fit)| {
@@ -111,7 +112,7 @@ impl Drawn {
                 effect: term.effect,
                 values: in_nm(&without.r.iter().zip(&fit.r).map(|(a, b)| a - b).collect::<Vec<_>>()),
                 columns: columns[own.clone()].iter().map(|c| in_nm(c)).collect(),
-                covariance: covariance.view((own.start, own.start), (own.len(), own.len())).into_owned(),
+                covariance: block(covariance, &own),
                 coordinate: None,
                 relative_to: (subsystem_of(term.effect) == Some(Subsystem::Friction))
                     .then(|| friction_nm.clone()),
@@ -121,7 +122,6 @@ impl Drawn {
             part: Part::Friction,
             unit: "N m",
             coordinates: coordinates_of(&contact.logs, &contact.scales),
-            time_s: contact.logs.iter().flat_map(|log| log.grid.time_s.iter().copied()).collect(),
             rows: (0..deviation.len()).filter(|i| deviation[*i] < limit && fit.r[*i] != 0.0).collect(),
             left: [in_nm(&none.r), in_nm(&fit.r)],
             components: fit.terms.iter().zip(&without).map(component).collect(),
@@ -164,7 +164,7 @@ impl Drawn {
         let lines = vec![
             bins.band("95 % of the law", &law, &widths),
             bins.line("law", Role::Series, law),
-            bins.line("measured less all else", Role::Measured, measured),
+            bins.line("partial residual", Role::Measured, measured),
         ];
         let title = match component.relative_to {
             Some(_) => format!("change of the {}, relative", self.part.quantity()),
@@ -173,7 +173,7 @@ impl Drawn {
         let mut chart = bins.chart(name, &title, lines);
         chart.title = self.title(component);
         chart.caption = format!(
-            "Means of {} bins of training samples; they hold {:.0} % of the law's mean square.",
+            "The partial residual is what is measured less all else of the answer; means of {} bins of training samples, which hold {:.0} % of the law's mean square.",
             chart.counts.len(),
             100.0 * share
         );
@@ -186,16 +186,17 @@ impl Drawn {
 
     /// Where its own coordinates do not show it: the log in which it is largest, opened where it is.
     fn over_time(&self, component: &Component) -> Chart {
-        let mut logs: Vec<std::ops::Range<usize>> = Vec::new();
-        for i in 0..self.time_s.len() {
+        let time_s = self.coordinates.iter().find(|c| c.0 == TIME).map_or(&[][..], |c| &c.1);
+        let mut logs: Vec<Range<usize>> = Vec::new();
+        for i in 0..time_s.len() {
             match logs.last_mut() {
-                Some(log) if self.time_s[i] > self.time_s[log.end - 1] => log.end = i + 1,
+                Some(log) if time_s[i] > time_s[log.end - 1] => log.end = i + 1,
                 _ => logs.push(i..i + 1),
             }
         }
-        let largest = |log: &std::ops::Range<usize>| rms(&component.values[log.clone()]);
+        let largest = |log: &Range<usize>| rms(&component.values[log.clone()]);
         let log = logs.into_iter().max_by(|a, b| largest(a).total_cmp(&largest(b))).unwrap_or(0..0);
-        let (time, law) = (&self.time_s[log.clone()], &component.values[log.clone()]);
+        let (time, law) = (&time_s[log.clone()], &component.values[log.clone()]);
         let measured: Vec<f64> =
             self.left[1][log.clone()].iter().zip(law).map(|(rest, law)| rest + law).collect();
         let counted = self.counted(&log);
@@ -212,11 +213,11 @@ impl Drawn {
         let range = |from: usize, to: usize| (time[from], time[to - 1]);
         Chart {
             title: self.title(component),
-            caption: "None of the coordinates explains most of it: over time, in the training log in which it is largest.".into(),
+            caption: "The partial residual is what is measured less all else of the answer. No coordinate explains most of the law: over time, in the training log in which it is largest.".into(),
             x_title: TIME.into(),
             panels: vec![Panel {
                 y_title: format!("{}, {}", self.part.quantity(), self.unit),
-                lines: vec![line("measured less all else", Role::Measured, &measured), line("law", Role::Series, law)],
+                lines: vec![line("partial residual", Role::Measured, &measured), line("law", Role::Series, law)],
             }],
             windows: vec![
                 Window { label: "where it is largest".into(), range: range(from, to) },
@@ -227,7 +228,7 @@ impl Drawn {
     }
 
     /// Which points of a stretch count.
-    fn counted(&self, stretch: &std::ops::Range<usize>) -> Vec<bool> {
+    fn counted(&self, stretch: &Range<usize>) -> Vec<bool> {
         let mut counted = vec![false; stretch.len()];
         let own = self.rows.iter().filter(|i| stretch.contains(*i));
         own.for_each(|i| counted[i - stretch.start] = true);
@@ -254,6 +255,11 @@ impl Drawn {
         charts.sort_by(|a, b| b.0.total_cmp(&a.0));
         charts.into_iter().take(MOST_RESIDUALS).map(|(_, chart)| chart).collect()
     }
+}
+
+/// What a covariance says of these values alone.
+fn block(covariance: &DMatrix<f64>, own: &Range<usize>) -> DMatrix<f64> {
+    covariance.view((own.start, own.start), (own.len(), own.len())).into_owned()
 }
 
 /// The stretch in which a signal is strongest at the points that count, as long as some swings of it.
@@ -296,8 +302,7 @@ mod tests {
         Drawn {
             part: Part::Drive,
             unit: "N m",
-            coordinates: vec![("time, s".into(), time_s.clone()), ("speed, rad/s".into(), speed)],
-            time_s,
+            coordinates: vec![(TIME.into(), time_s), ("speed, rad/s".into(), speed)],
             rows: (0..POINTS).collect(),
             left: [left.clone(), left],
             components: vec![component],

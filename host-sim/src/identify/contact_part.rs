@@ -9,7 +9,7 @@ use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search;
-use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales};
+use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales, TIME};
 use super::effects::{ContactView, LIBRARY};
 use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
 use super::linear_part::Linear;
@@ -250,7 +250,7 @@ pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<
             "disc angle, rad".into(),
             signal(&|log| log.angle_rad.iter().map(|a| a.rem_euclid(std::f64::consts::TAU)).collect()),
         ),
-        ("time, s".into(), signal(&|log| log.grid.time_s.clone())),
+        (TIME.into(), signal(&|log| log.grid.time_s.clone())),
     ]);
     out
 }

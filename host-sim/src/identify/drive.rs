@@ -8,6 +8,7 @@
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::contact::log::unwrapped;
+use super::effects::coordinates::TIME;
 use super::filters::{gaussian, largest_change, rms, steps, white_share};
 use super::grid::Grid;
 use super::noise;
@@ -180,7 +181,7 @@ pub fn coordinates(logs: &[DriveLog], rotary: bool) -> Vec<(String, Vec<f64>)> {
         (format!("speed, {length}/s"), all(&|log| log.speed.clone())),
         (format!("acceleration, {length}/s²"), all(&|log| log.acceleration.clone())),
         (format!("{place}, {length}"), all(&|log| log.position.iter().map(within).collect())),
-        ("time, s".into(), all(&|log| log.grid.time_s.clone())),
+        (TIME.into(), all(&|log| log.grid.time_s.clone())),
     ];
     if logs.iter().all(|log| log.load_n.is_some()) {
         out.push(("normal force, N".into(), all(&|log| log.load_n.clone().unwrap_or_default())));

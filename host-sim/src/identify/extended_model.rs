@@ -45,8 +45,18 @@ pub struct ExtendedContact {
     pub model: ModelFile,
     /// Parameters of the effects in the contact.
     pub values: Values,
-    /// The answer with its laws, and the covariance of its values.
-    pub fit: (Fit, DMatrix<f64>),
+    /// The answer with its laws.
+    pub laws: FittedLaws,
+}
+
+/// A fit of the contact's answer in laws.
+pub struct FittedLaws {
+    /// The fit.
+    pub fit: Fit,
+    /// Slopes of its residuals (negative), a column for each value.
+    pub columns: Vec<Vec<f64>>,
+    /// Covariance of its values.
+    pub covariance: DMatrix<f64>,
 }
 
 /// The contact's answer in the core's laws.
@@ -57,7 +67,8 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
     let problem = part.problem();
     let fit = search::as_laws(&problem, part.fit(place));
     let base = part.baseline.free.len();
-    let covariance = covariance(&problem, &fit);
+    let laws = FittedLaws::new(&problem, fit);
+    let FittedLaws { fit, covariance, .. } = &laws;
     let mut numbers = part.baseline.numbers(&fit.p);
     let mut values = Values::new();
     let mut extensions = Vec::new();
@@ -131,7 +142,7 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
             extended.extensions.pop();
         }
     }
-    Ok(ExtendedContact { model: extended, values, fit: (fit, covariance) })
+    Ok(ExtendedContact { model: extended, values, laws })
 }
 
 impl ExtendedContact {
@@ -144,23 +155,26 @@ impl ExtendedContact {
         let free = fit_parameters::default_free(&self.model);
         let fit = fit_contact::identify(&self.model, rig, logs, &free, Begin::There, progress);
         let Ok(fit) = fit else { return self };
-        let Self { mut values, fit: laws, .. } = self;
+        let Self { mut values, laws, .. } = self;
         for (at, name) in fit.names.iter().enumerate() {
             let std = fit.ends[at].map(|_| fit.std[at]);
             for own in values.values_mut().filter_map(|entry| entry.get_mut(name)) {
                 *own = Value { value: fit.values[at], std };
             }
         }
-        Self { model: fit.model, values, fit: laws }
+        Self { model: fit.model, values, laws }
     }
 }
 
-/// Of all fitted values, from blocks of the residuals: what strikes a few load steps is known by those few.
-fn covariance(problem: &Problem<'_>, fit: &Fit) -> DMatrix<f64> {
-    let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
-    let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
-    let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
-    fit_interval::covariance(&columns, &fit.r, &lengths, &prior_sd)
+impl FittedLaws {
+    /// With the covariance from blocks of the residuals: what strikes a few load steps is known by those few.
+    fn new(problem: &Problem<'_>, fit: Fit) -> Self {
+        let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
+        let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
+        let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
+        let covariance = fit_interval::covariance(&columns, &fit.r, &lengths, &prior_sd);
+        Self { fit, columns, covariance }
+    }
 }
 
 /// A model file with fitted numbers; `block` makes a model without one the series element.

@@ -7,6 +7,7 @@
 
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
+use super::effects::coordinates::TIME;
 use super::filters::{
     adaptively_smoothed, derivative_of_motion, gaussian, largest_change, local_maximum, rms, white_share,
 };
@@ -38,7 +39,11 @@ pub struct NormalLoadLog {
     pub angle_rad: Option<Vec<f64>>,
     /// Normal force, N.
     pub normal_n: Vec<f64>,
-    /// The same without its noise, through the filter.
+    /// Both without their noise and with their peaks.
+    pub smoothed_torque_nm: Vec<f64>,
+    /// As [`Self::smoothed_torque_nm`].
+    pub smoothed_n: Vec<f64>,
+    /// Normal force without its noise, through the filter.
     pub filtered_n: Vec<f64>,
     /// Time since the log's start, s.
     pub time_s: Vec<f64>,
@@ -54,16 +59,19 @@ impl NormalLoadLog {
     /// The normal-load actuator of a contact log; `None` where M1's torque is not logged.
     pub fn new(log: &ContactLog) -> Option<Self> {
         let torque_nm = log.m1_torque_nm.clone()?;
+        let torque_noise_nm = noise::standard_deviation(&torque_nm);
         let normal_noise_n = noise::standard_deviation(&log.normal_n);
         // Its noise would make a smaller gain look better where levels do not tell it, and pay for what makes up for that.
         let smoothed_n = adaptively_smoothed(&log.normal_n, normal_noise_n);
         Some(Self {
             step_s: log.grid.step_s,
-            torque_noise_nm: noise::standard_deviation(&torque_nm),
+            torque_noise_nm,
             normal_noise_n,
+            smoothed_torque_nm: adaptively_smoothed(&torque_nm, torque_noise_nm),
             torque_nm,
             angle_rad: log.m1_angle_rad.clone(),
             filtered_n: gaussian(&smoothed_n, WIDTH, 0),
+            smoothed_n,
             normal_n: log.normal_n.clone(),
             time_s: log.grid.time_s.clone(),
             usable: log.usable.clone(),
@@ -118,7 +126,7 @@ pub fn coordinates(logs: &[NormalLoadLog]) -> Vec<(String, Vec<f64>)> {
     let mut out = vec![
         ("normal force, N".into(), all(&|log| log.filtered_n.clone())),
         ("rate of the normal force, N/s".into(), all(&rate)),
-        ("time, s".into(), all(&|log| log.time_s.clone())),
+        (TIME.into(), all(&|log| log.time_s.clone())),
     ];
     if logs.iter().all(|log| log.angle_rad.is_some()) {
         out.push(("angle of M1, rad".into(), all(&|log| log.angle_rad.clone().unwrap_or_default())));

@@ -190,7 +190,7 @@ fn stated(
 fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Vec<Alternative> {
     let trial = |numbers: &Coupling, bearing: &[f64], pull: f64| -> Option<Trial> {
         let alternative = alternative(effect, view, numbers, bearing, pull)?;
-        let solved = view.balance.solve_forms(&joined(view, &alternative));
+        let solved = view.balance.solve_forms(&view.company.with(&alternative));
         Some(Trial { numbers: *numbers, alternative, solved })
     };
     let refined_by = |start: Trial, bearing: &[f64], pull: f64| {
@@ -206,7 +206,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         Some(Alternative { log_prior, ..stated(effect, view, &best.numbers, bearing)? })
     };
     let sharpened = |mut best: (Trial, f64)| -> Option<Alternative> {
-        let bearing = view.balance.bearing(&joined(view, &best.0.alternative));
+        let bearing = view.balance.bearing(&view.company.with(&best.0.alternative));
         let weaker = if best.0.numbers.is_play() { &[][..] } else { &WEAKER };
         for pull in weaker {
             let start = trial(&best.0.numbers, &bearing, *pull);
@@ -267,11 +267,6 @@ fn reckoned(view: &DriveView<'_>, numbers: &Coupling, bearing: &[f64], mut form:
         disc.angle_rad = RECKONED.map(angles).to_vec();
     }
     form
-}
-
-/// A form beside those that stand in the balance.
-fn joined<'a>(view: &'a DriveView<'_>, form: &'a Alternative) -> Vec<&'a Alternative> {
-    view.company.forms.iter().copied().chain([form]).collect()
 }
 
 /// A coupling with what the balance makes of it.

@@ -6,6 +6,9 @@ use crate::identify::filters::rms;
 /// Times over which heat is held, s: from within a slide to longer than a log.
 pub const HEAT_TIMES_S: [f64; 3] = [1.5, 15.0, 50.0];
 
+/// Name of the time within a log, with its unit, among what may be followed.
+pub const TIME: &str = "time, s";
+
 /// Coordinates of a log.
 #[derive(Debug, Clone)]
 pub struct Coordinates {

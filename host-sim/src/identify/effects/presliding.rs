@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::stops::{Stops, stop};
+use super::stops::{Stops, about, coarse, log_prior, stop};
 use super::waves::travel;
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
@@ -20,10 +20,7 @@ pub(super) struct Presliding;
 const LONGEST: f64 = 0.1;
 const LONGEST_TRAVEL_RAD: f64 = 3.0;
 const SHORTEST: f64 = 1.0 / 128.0;
-/// Ways of Dahl's spring that are tried from the longest on, a factor of √2 apart, and steps of a finer grid between two.
-const WAYS: i32 = 15;
-const FINE: i32 = 4;
-/// The name of it.
+/// The name of the way of Dahl's spring.
 const YIELD_WAY: &str = "yield_way";
 
 impl Effect for Presliding {
@@ -38,49 +35,45 @@ impl Effect for Presliding {
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let reach = view.logs.iter().map(|log| travel(log.position.iter().copied())).fold(0.0, f64::max);
         let longest = LONGEST * if view.rotary { reach.min(LONGEST_TRAVEL_RAD) } else { reach };
+        let at_once: Vec<Vec<f64>> = view.logs.iter().map(|log| direction(log, view.scales.speed)).collect();
         // By how much less than at once it slides.
-        let column = |way: f64| {
-            let of = |log: &DriveLog| {
-                let at_once = direction(log, view.scales.speed);
-                let carried = log.filtered(&stop(&log.position, way));
+        let later = |carried: &dyn Fn(&[f64]) -> Vec<f64>| -> Vec<f64> {
+            let of = |(log, at_once): (&DriveLog, &Vec<f64>)| {
+                let carried = log.filtered(&carried(&log.position));
                 carried.iter().zip(at_once).map(|(y, s)| y - s).collect::<Vec<f64>>()
             };
-            view.logs.iter().flat_map(of).collect()
+            view.logs.iter().zip(&at_once).flat_map(of).collect()
         };
-        let stops = Stops { effect: self.id(), size: view.scales.own, column: &column, deflection: None };
-        let spring = |way: f64| {
-            let of = |log: &DriveLog| {
-                let at_once = direction(log, view.scales.speed);
-                let carried = log.filtered(&dahl(&log.position, way));
-                carried.iter().zip(at_once).map(|(y, s)| y - s).collect::<Vec<f64>>()
-            };
-            Alternative {
-                form: "Dahl's spring".into(),
-                constants: vec![(YIELD_WAY.into(), way)],
-                ..Alternative::columns(
-                    self.id(),
-                    vec![Parameter::positive("sliding_later", view.scales.own)],
-                    vec![view.logs.iter().flat_map(of).collect()],
-                )
-            }
+        let units @ [of_way, of_size] = if view.rotary { ["rad", "nm"] } else { ["m", "n"] };
+        let stops = Stops {
+            effect: self.id(),
+            size: view.scales.own,
+            units,
+            column: &|way| later(&|position| stop(position, way)),
+            deflection: None,
+        };
+        let spring = |way: f64| Alternative {
+            form: "Dahl's spring".into(),
+            constants: vec![(format!("{YIELD_WAY}_{of_way}"), way)],
+            ..Alternative::columns(
+                self.id(),
+                vec![Parameter::positive(format!("sliding_later_{of_size}"), view.scales.own)],
+                vec![later(&|position| dahl(position, way))],
+            )
         };
         if let Some(fixed) = view.fixed {
-            let way = fixed.iter().find(|(name, _)| name == YIELD_WAY);
+            let way = fixed.iter().find(|(name, _)| name.starts_with(YIELD_WAY));
             return vec![way.map_or_else(|| stops.of_constants(fixed), |(_, way)| spring(*way))];
         }
-        let evidence = |way: f64| {
-            let form = spring(way);
-            let forms: Vec<&Alternative> = view.company.forms.iter().copied().chain([&form]).collect();
-            view.balance.solve_forms(&forms).log_evidence
-        };
         let best = |ways: Vec<f64>| {
+            let evidence = |way: f64| view.balance.solve_forms(&view.company.with(&spring(way))).log_evidence;
             let tried: Vec<(f64, f64)> = ways.into_par_iter().map(|way| (evidence(way), way)).collect();
             tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or(longest, |(_, way)| way)
         };
-        let coarse = best((0..WAYS).map(|i| longest * 0.5f64.powf(0.5 * f64::from(i))).collect());
-        let fine = best((1 - FINE..FINE).map(|i| coarse * 0.5f64.powf(0.5 * f64::from(i) / f64::from(FINE))).collect());
-        let spring = Alternative { log_prior: -f64::from(WAYS * FINE).ln(), ..spring(fine) };
-        vec![stops.searched(view.balance, view.company, [SHORTEST * longest, longest]), spring]
+        let ways = coarse([SHORTEST * longest, longest]);
+        let way = best(about(best(ways.clone())).collect());
+        let spring = Alternative { log_prior: log_prior(&ways), ..spring(way) };
+        vec![stops.searched(view.balance, view.company, &ways), spring]
     }
 }
 

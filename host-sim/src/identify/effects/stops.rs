@@ -1,7 +1,7 @@
 //! Rate-independent hysteresis as stops side by side (W. D. Iwan, J. Appl. Mech. 33, 1966): y = Σ f_w · stop_w(x)/w, f_w ≥ 0.
 //!
-//! A stop of width w follows x and slides at ± w. Their sum has any concave curve after a reversal, those of Dahl and of Bouc and
-//! Wen among them. The widths are those that the logs ask for: of a coarse grid, then of a fine one about what was found.
+//! A stop of width w follows x and slides at ± w. Their sum has any concave curve after a reversal, the same after each. The
+//! widths are those that the logs ask for: of a coarse grid, then of a fine one about what was found.
 
 use crate::identify::balance::{Alternative, Balance, Company};
 use crate::identify::term::Parameter;
@@ -11,6 +11,22 @@ const COARSE: f64 = std::f64::consts::SQRT_2;
 const FINE: i32 = 4;
 /// Names of the widths among the constants.
 const WIDTH: &str = "width_";
+
+/// Widths from the longest on down to the shortest, the coarse grid.
+pub(super) fn coarse([shortest, longest]: [f64; 2]) -> Vec<f64> {
+    let count = ((longest / shortest).ln() / COARSE.ln()).round() as i32;
+    (0..=count).map(|i| longest * COARSE.powi(-i)).collect()
+}
+
+/// A width of the coarse grid, and the finer ones up to its neighbours.
+pub(super) fn about(width: f64) -> impl Iterator<Item = f64> {
+    (1 - FINE..FINE).map(move |step| width * COARSE.powf(f64::from(step) / f64::from(FINE)))
+}
+
+/// ln prior of a width that is chosen on these grids.
+pub(super) fn log_prior(coarse: &[f64]) -> f64 {
+    -(f64::from(FINE) * coarse.len() as f64).ln()
+}
 
 /// A play operator: follows its input at a distance of at most `width`.
 pub(super) fn play(values: &[f64], width: f64) -> impl Iterator<Item = f64> + '_ {
@@ -32,6 +48,8 @@ pub(super) struct Stops<'s> {
     pub(super) effect: &'static str,
     /// A large amplitude.
     pub(super) size: f64,
+    /// Units of the widths and of the amplitudes, as names have them.
+    pub(super) units: [&'static str; 2],
     /// Columns of a width over all rows.
     pub(super) column: &'s dyn Fn(f64) -> Vec<f64>,
     /// What a column is, times its width, with its unit, where it is the stop's own deflection.
@@ -41,8 +59,10 @@ pub(super) struct Stops<'s> {
 impl Stops<'_> {
     /// With these widths.
     pub(super) fn of_widths(&self, widths: &[f64]) -> Alternative {
-        let parameter = |i: usize| Parameter::positive(format!("sliding_at_width_{}", i + 1), self.size);
-        let constant = |(i, width): (usize, &f64)| (format!("{WIDTH}{}", i + 1), *width);
+        let [of_width, of_size] = self.units;
+        let parameter =
+            |i: usize| Parameter::positive(format!("sliding_at_width_{}_{of_size}", i + 1), self.size);
+        let constant = |(i, width): (usize, &f64)| (format!("{WIDTH}{}_{of_width}", i + 1), *width);
         Alternative {
             constants: widths.iter().enumerate().map(constant).collect(),
             ..Alternative::columns(
@@ -60,44 +80,32 @@ impl Stops<'_> {
         self.of_widths(&widths)
     }
 
-    /// With the widths that a balance asks for beside what stands in it, from the longest on down to the shortest.
-    pub(super) fn searched(
-        &self,
-        balance: &Balance,
-        company: Company<'_>,
-        [shortest, longest]: [f64; 2],
-    ) -> Alternative {
-        let count = ((longest / shortest).ln() / COARSE.ln()).round() as i32;
-        let coarse: Vec<f64> = (0..=count).map(|i| longest * COARSE.powi(-i)).collect();
+    /// With the widths that a balance asks for beside what stands in it, of these and those about them.
+    pub(super) fn searched(&self, balance: &Balance, company: Company<'_>, coarse: &[f64]) -> Alternative {
         // Those with a size, and that of the largest.
         let asked_for = |widths: &[f64]| -> (Vec<f64>, Option<f64>) {
             let form = self.of_widths(widths);
-            let forms: Vec<&Alternative> = company.forms.iter().copied().chain([&form]).collect();
-            let solved = balance.solve_forms(&forms);
+            let solved = balance.solve_forms(&company.with(&form));
             let own = &solved.p[solved.p.len() - widths.len()..];
             let sized = || widths.iter().zip(own).filter(|(_, size)| **size > 0.0);
             let largest = sized().max_by(|a, b| a.1.total_cmp(b.1)).map(|(width, _)| *width);
             (sized().map(|(width, _)| *width).collect(), largest)
         };
-        let about = |width: &f64| {
-            let width = *width;
-            (1 - FINE..FINE).map(move |step| width * COARSE.powf(f64::from(step) / f64::from(FINE)))
-        };
+        let longest = coarse.first().copied().unwrap_or(0.0);
         let mut fine: Vec<f64> =
-            asked_for(&coarse).0.iter().flat_map(about).filter(|w| *w <= longest).collect();
+            asked_for(coarse).0.into_iter().flat_map(about).filter(|w| *w <= longest).collect();
         fine.sort_by(|a, b| b.total_cmp(a));
         fine.dedup_by(|a, b| *a > 0.999 * *b);
         let (found, largest) = asked_for(&fine);
         if found.is_empty() {
-            return self.of_widths(&coarse);
+            return self.of_widths(coarse);
         }
-        let candidates = f64::from(FINE * (count + 1));
         let follows = |(name, width): (&str, f64)| {
             (name.to_string(), (self.column)(width).iter().map(|share| width * share).collect())
         };
         Alternative {
             // The widths were chosen among so many.
-            log_prior: -(found.len() as f64) * candidates.ln(),
+            log_prior: found.len() as f64 * log_prior(coarse),
             coordinate: self.deflection.zip(largest).map(follows),
             ..self.of_widths(&found)
         }
@@ -133,11 +141,12 @@ mod tests {
         let stops = Stops {
             effect: "lever_hysteresis",
             size: 0.5,
+            units: ["nm", "nm"],
             column: &|width| stop(&x, width),
             deflection: None,
         };
         let alone = Company { forms: &[], residual: &balance.response };
-        let found = stops.searched(&balance, alone, [0.01, 0.64]);
+        let found = stops.searched(&balance, alone, &coarse([0.01, 0.64]));
         let solved = balance.solve_forms(&[&found]);
         let about = |width: f64| -> f64 {
             let near = |(own, size): (&(String, f64), &f64)| {
