@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::balance::Alternative;
 use super::contact::baseline;
 use super::contact::change::{Change, ContactTerm};
+use super::contact::channel::before_ringing;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
@@ -186,12 +187,25 @@ fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], contributions: &[Vec<C
     &best.unwrap_or(&ranked[0]).fit
 }
 
-/// Where the friction channel shows an end of its range, the drive's balance has no friction torque; `None` where it does not.
-pub fn without_ends(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
-    let ends = change.ends_nm?;
-    let mut seen = logs.to_vec();
-    seen.iter_mut().for_each(|log| log.leave_out_ends(ends));
-    Some(seen)
+/// What the drive's balance sees of the friction channel: no torque where it shows an end of its range, and the torque itself
+/// where its sensor rings. `None` where it does neither.
+pub fn behind_channel(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
+    let torque_nm = |log: &ContactLog| before_ringing(&log.friction_nm, change.mode?, log.grid.step_s);
+    let rings = logs.first().is_some_and(|log| torque_nm(log).is_some());
+    if change.ends_nm.is_none() && !rings {
+        return None;
+    }
+    let seen = |log: &ContactLog| {
+        let mut seen = log.clone();
+        if let Some(ends) = change.ends_nm {
+            seen.leave_out_ends(ends);
+        }
+        if let Some(torque_nm) = torque_nm(log) {
+            seen.friction_nm = torque_nm;
+        }
+        seen
+    };
+    Some(logs.iter().map(seen).collect())
 }
 
 /// Where the normal channel shows its end, the actuator's balance has no normal force; `None` where it does not.

@@ -114,7 +114,7 @@ pub fn errors(
         let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
         let fit = contact.fit(place);
         let change = contact.problem().change(&fit.terms, &fit.p);
-        let sensed = contact_part::without_ends(&prepared, &change);
+        let sensed = contact_part::behind_channel(&prepared, &change);
         let drives: Option<Vec<DriveLog>> = sensed
             .as_ref()
             .unwrap_or(&prepared)
@@ -326,9 +326,7 @@ fn drive_alternatives(
         }
         r
     };
-    let mut fixed = Vec::new();
-    for chosen in &solved.set {
-        let own = &part.alternatives[*chosen];
+    let known = |own: &Alternative, bearing: Option<&[f64]>| -> Vec<Alternative> {
         let view = DriveView {
             logs,
             scales: part.drive_scales.as_ref().unwrap_or(&scales),
@@ -337,8 +335,24 @@ fn drive_alternatives(
             rotary: !found.linear_stage,
             inertia: none.p[drive::INERTIA],
             fixed: Some(&own.constants),
+            bearing,
         };
-        fixed.extend(effects::with_id(own.effect).into_iter().flat_map(|e| e.drive(&view)));
+        effects::with_id(own.effect).into_iter().flat_map(|e| e.drive(&view)).collect()
+    };
+    let chosen = solved.set.iter().map(|chosen| &part.alternatives[*chosen]);
+    let (couplings, others): (Vec<&Alternative>, Vec<&Alternative>) =
+        chosen.partition(|own| own.is_coupling());
+    let mut fixed: Vec<Alternative> = others.into_iter().flat_map(|own| known(own, None)).collect();
+    if !couplings.is_empty() {
+        // What is in the shaft is the motor's torque less its inertia and what else bears on it.
+        let mut bearing = vec![0.0; balance.response.len()];
+        let base = balance.base.iter().map(|b| &b.1).zip(&solved.p).skip(drive::INERTIA + 1);
+        let forms = known_forms(part, solved, &fixed);
+        let of_forms = forms.filter_map(|(form, p)| Some(form.columns.iter().zip(p?)));
+        for (column, p) in base.chain(of_forms.flatten()) {
+            bearing.iter_mut().zip(column).for_each(|(sum, x)| *sum += p * x);
+        }
+        fixed.extend(couplings.into_iter().flat_map(|own| known(own, Some(&bearing))));
     }
     (balance, fixed)
 }

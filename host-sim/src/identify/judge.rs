@@ -123,7 +123,7 @@ struct Found {
     notes: Vec<String>,
 }
 
-/// Contact, drive and normal-load actuator. What the contact says of the channels' ends changes what the others see.
+/// Contact, drive and normal-load actuator. What the contact says of the channels changes what the others see.
 fn of_contact_logs(
     train: &[Log],
     rig: &RigFile,
@@ -157,7 +157,7 @@ fn of_contact_logs(
     if let Some(seen) = contact_part::without_normal_end(&contact.logs, &best) {
         normal_load = of_normal_load(&seen);
     }
-    if let Some(seen) = contact_part::without_ends(&contact.logs, &best) {
+    if let Some(seen) = contact_part::behind_channel(&contact.logs, &best) {
         drive = of_drive(&seen);
     }
     Ok(Found { contact: Some(contact), drive, normal_load, notes })

@@ -76,7 +76,16 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
     let mut balance = drive::balance(logs, prior, &scales);
     let inertia = balance.solve(&[], &[]).p[drive::INERTIA];
     let propose = |balance: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
-        let view = DriveView { logs, scales: &scales, balance, company, rotary, inertia, fixed: None };
+        let view = DriveView {
+            logs,
+            scales: &scales,
+            balance,
+            company,
+            rotary,
+            inertia,
+            fixed: None,
+            bearing: None,
+        };
         LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.drive(&view)).collect()
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);

@@ -80,10 +80,14 @@ impl Contribution {
         Self { size, over_rest }
     }
 
-    /// Its size over what a form that is known to `form` may look like: one that leaves more than it explains has the wrong
-    /// shape, and is then so much more likely a form; up to where nothing is.
-    pub fn over_form(&self, form: f64) -> f64 {
-        self.size / (form * self.over_rest.recip().clamp(1.0, BEYOND_FORM))
+    /// Its size over what could be the form of the model, or of a larger cause beside it that is wrong by `beside`. One that
+    /// leaves more than it explains has the wrong shape, and is so much more likely a form; up to where nothing is. One that
+    /// explains all that the larger cause leaves has a shape of its own, and is so much less likely that cause's form.
+    pub fn over_form(&self, beside: f64) -> f64 {
+        let leaves = self.over_rest.recip();
+        let of_model = MODEL_FORM * leaves.clamp(1.0, BEYOND_FORM);
+        let of_other = beside * leaves.clamp(BEYOND_FORM.recip(), BEYOND_FORM);
+        self.size / of_model.max(of_other)
     }
 }
 

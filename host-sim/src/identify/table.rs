@@ -1,6 +1,5 @@
 //! One table over what the balances found: the hypotheses with their evidence, and which effects could be the model's form.
 
-use super::contact::noise::MODEL_FORM;
 use super::rest::Contribution;
 
 /// A hypothesis has at most so many causes: more are no explanation but a fit, and what they would explain is left as it is.
@@ -168,7 +167,7 @@ pub fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall
                     let wrong_by = others.map(|(_, (other, form))| other.size * form).fold(0.0, f64::max);
                     sizes[at] = sizes[at].max(what.size);
                     // What a second cause adds may be the first one's form.
-                    let over = what.over_form(MODEL_FORM.max(wrong_by));
+                    let over = what.over_form(wrong_by);
                     over_floor[at] = over_floor[at].max(over);
                 }
             }

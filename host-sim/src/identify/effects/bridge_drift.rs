@@ -11,30 +11,88 @@ use crate::identify::term::{Column, Parameter};
 /// The effect.
 pub(super) struct BridgeDrift;
 
-/// Bends of the drift over time, in shares of the log: warming up, and steady.
+/// Bends of a drift that settles, in shares of the longest log: warming up, and steady.
 const BENDS: [f64; 3] = [0.1, 0.3, 10.0];
+/// Half periods in the longest log up to which a drift's wandering is told: what changes faster is none.
+const WANDERING: usize = 4;
+
+/// What a drift does over time, given as a share of the longest log, and from nothing where a log begins.
+#[derive(Debug, Clone, Copy)]
+enum Course {
+    /// It settles: a sum of exponentials.
+    Settles,
+    /// It wanders: a random walk by its largest parts, which are a straight line and sines that stand for its way back
+    /// (Karhunen and Loève's of the Wiener process and of its bridge).
+    Wanders,
+}
+
+impl Course {
+    const ALL: [Self; 2] = [Self::Settles, Self::Wanders];
+
+    /// Its parts: names and largest values.
+    fn parts(self) -> Vec<(String, f64)> {
+        match self {
+            Self::Settles => BENDS.map(|bend| (bend.to_string(), 1.0)).into(),
+            Self::Wanders => {
+                let of_bridge = |n: usize| std::f64::consts::SQRT_2 / (std::f64::consts::PI * n as f64);
+                let sines = (1..=WANDERING).map(|n| (format!("wanders_{n}"), of_bridge(n)));
+                std::iter::once(("steady".into(), 1.0)).chain(sines).collect()
+            }
+        }
+    }
+
+    /// Part number `part` over time.
+    fn part(self, part: usize, time: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Settles => saturating(time, 1.0, BENDS[part]),
+            Self::Wanders if part == 0 => time.to_vec(),
+            Self::Wanders => time.iter().map(|t| (std::f64::consts::PI * part as f64 * t).sin()).collect(),
+        }
+    }
+
+    /// The parameters of its parts, for a zero and for a gain, each so large at most.
+    fn parameters(self, of: &str, kinds: [&str; 2], size: f64) -> Vec<Parameter> {
+        let named = |kind: &str| {
+            let part = |(name, share)| Parameter::amplitude(format!("{of}_{kind}_{name}"), share * size);
+            self.parts().into_iter().map(part).collect::<Vec<_>>()
+        };
+        kinds.into_iter().flat_map(named).collect()
+    }
+
+    /// Its columns, for a zero and for a gain: `column` makes one of what a part does over time.
+    fn columns<C>(self, column: impl Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> C) -> [Vec<C>; 2] {
+        [false, true].map(|gain| {
+            let parts = 0..self.parts().len();
+            parts.map(|part| column(&|time: &[f64]| self.part(part, time), gain)).collect()
+        })
+    }
+}
 
 /// The core's drift, which has one settling time: least squares on the sum of the columns over the log.
-fn export(p: &[f64], bridge: &str, time_s: f64, zero: f64) -> Vec<(String, f64)> {
+fn export(course: Course, p: &[f64], bridge: &str, time_s: f64, zero: f64) -> Vec<(String, f64)> {
     const POINTS: usize = 100;
-    let at = |sizes: &[f64], t: f64| -> f64 {
-        BENDS.iter().zip(sizes).map(|(b, p)| p * (1.0 - (-t / b).exp()) / (1.0 - (-1.0 / b).exp())).sum()
-    };
-    let (zeros, gains) = p.split_at(BENDS.len());
+    let times: [f64; POINTS] = std::array::from_fn(|i| (i + 1) as f64 / POINTS as f64);
+    let [zeros, gains] = [0, 1].map(|kind| {
+        let count = p.len() / 2;
+        let mut sum = vec![0.0; POINTS];
+        for (part, size) in p[kind * count..][..count].iter().enumerate() {
+            sum.iter_mut().zip(course.part(part, &times)).for_each(|(sum, x)| *sum += size * x);
+        }
+        sum
+    });
     let mut best = (f64::INFINITY, 0.0, 0.0, 0.0);
     for i in 0..40 {
         // From steady to settled in a fiftieth of the log.
         let rate = if i == 0 { 0.0 } else { 0.2 * 1.15f64.powi(i) };
         let shape = |t: f64| if rate == 0.0 { t } else { (1.0 - (-rate * t).exp()) / rate };
-        let (mut zz, mut z, mut g) = (1e-12, 0.0, 0.0);
-        let times = || (1..=POINTS).map(|i| i as f64 / POINTS as f64);
-        for t in times() {
-            (zz, z, g) = (zz + shape(t).powi(2), z + shape(t) * at(zeros, t), g + shape(t) * at(gains, t));
+        let all = || times.iter().zip(zeros.iter().zip(&gains)).map(|(t, (zero, gain))| (shape(*t), zero, gain));
+        let (mut ss, mut z, mut g) = (1e-12, 0.0, 0.0);
+        for (shape, zero, gain) in all() {
+            (ss, z, g) = (ss + shape * shape, z + shape * zero, g + shape * gain);
         }
-        let (z, g) = (z / zz, g / zz);
-        let off: f64 = times()
-            .map(|t| (at(zeros, t) - z * shape(t)).powi(2) + (at(gains, t) - g * shape(t)).powi(2))
-            .sum();
+        let (z, g) = (z / ss, g / ss);
+        let off: f64 =
+            all().map(|(shape, zero, gain)| (zero - z * shape).powi(2) + (gain - g * shape).powi(2)).sum();
         if off < best.0 {
             best = (off, rate, z, g);
         }
@@ -64,34 +122,35 @@ impl Effect for BridgeDrift {
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
         let s = view.scales;
         let (s_time, s_torque, s_load) = (s.time_s, s.torque_nm, s.load_n);
-        let over_time = |bend: f64, of: &dyn Fn(usize, usize) -> f64| -> Column {
+        let over_time = |course: &dyn Fn(&[f64]) -> Vec<f64>, of: &dyn Fn(usize, usize) -> f64| -> Column {
             let column = |(at, c): (usize, &super::Coordinates)| {
-                saturating(&c.time, 1.0, bend).iter().enumerate().map(|(i, x)| x * of(at, i)).collect()
+                course(&c.time).iter().enumerate().map(|(i, x)| x * of(at, i)).collect()
             };
             view.coordinates.iter().enumerate().map(column).collect()
         };
-        let zero = |_: usize, _: usize| s.torque_nm;
-        let gain = |_: usize, _: usize| 1.0;
-        let friction = [&zero as &dyn Fn(usize, usize) -> f64, &gain].map(|of| BENDS.map(|b| over_time(b, of)).to_vec());
-        // An error of the load is a factor of friction the other way.
-        let load_zero = |at: usize, i: usize| s.load_n / view.logs[at].load_n[i].max(0.06 * s.load_n);
-        let normal: Vec<Column> = BENDS
-            .iter()
-            .map(|b| over_time(*b, &load_zero))
-            .chain(BENDS.iter().map(|b| over_time(*b, &gain)))
-            .collect();
-        let named = |bridge: &str| -> Vec<Parameter> {
-            let kinds = ["zero", "gain"].into_iter();
-            kinds
-                .flat_map(|kind| BENDS.map(|b| Parameter::amplitude(format!("{bridge}_{kind}_{b}"), 1.0)))
-                .collect()
+        let of_course = |course: Course| {
+            let friction = course.columns(|part, gain| {
+                let size = if gain { 1.0 } else { s.torque_nm };
+                over_time(part, &|_, _| size)
+            });
+            // An error of the load is a factor of friction the other way.
+            let normal = course.columns(|part, gain| {
+                let load = |at: usize, i: usize| s.load_n / view.logs[at].load_n[i].max(0.06 * s.load_n);
+                over_time(part, &|at, i| if gain { 1.0 } else { load(at, i) })
+            });
+            let named = |bridge: &str| course.parameters(bridge, ["zero", "gain"], 1.0);
+            let forms = match course {
+                Course::Settles => ["friction", "normal"],
+                Course::Wanders => ["friction wanders", "normal wanders"],
+            };
+            [
+                ContactTerm::amplifier(self.id(), forms[0], friction, named("friction"))
+                    .exported(move |p, _| export(course, p, "friction", s_time, s_torque)),
+                ContactTerm::factor(self.id(), forms[1], normal.concat(), named("normal"))
+                    .exported(move |p, _| export(course, p, "normal", s_time, s_load)),
+            ]
         };
-        vec![
-            ContactTerm::amplifier(self.id(), "friction", friction, named("friction"))
-                .exported(move |p, _| export(p, "friction", s_time, s_torque)),
-            ContactTerm::factor(self.id(), "normal", normal, named("normal"))
-                .exported(move |p, _| export(p, "normal", s_time, s_load)),
-        ]
+        Course::ALL.into_iter().flat_map(of_course).collect()
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
@@ -99,41 +158,100 @@ impl Effect for BridgeDrift {
         if s.load_n <= 0.0 {
             return Vec::new();
         }
-        let over_time = |bend: f64, with_force: bool| {
+        let over_time = |course: &dyn Fn(&[f64]) -> Vec<f64>, with_force: bool| {
             let of = |log: &super::DriveLog| {
                 let time: Vec<f64> = log.grid.time_s.iter().map(|t| t / s.time_s).collect();
                 let friction = log.friction.clone().unwrap_or_else(|| vec![0.0; log.len()]);
                 let size = |i: usize| if with_force { friction[i] / s.effort } else { 1.0 };
-                let drift: Vec<f64> =
-                    saturating(&time, 1.0, bend).iter().enumerate().map(|(i, d)| d * size(i)).collect();
+                let drift: Vec<f64> = course(&time).iter().enumerate().map(|(i, d)| d * size(i)).collect();
                 log.filtered(&drift)
             };
             view.logs.iter().flat_map(of).collect::<Vec<f64>>()
         };
-        let columns = [false, true].into_iter().flat_map(|force| BENDS.map(|b| over_time(b, force))).collect();
-        let parameters = ["zero_nm", "gain_nm"]
-            .into_iter()
-            .flat_map(|kind| BENDS.map(|b| Parameter::amplitude(format!("friction_{kind}_{b}"), s.effort)))
-            .collect();
-        vec![Alternative::columns(self.id(), parameters, columns)]
+        self.alternatives("friction", s.effort, over_time)
     }
 
     fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let s = view.scales;
-        let over_time = |bend: f64, with_load: bool| {
+        let over_time = |course: &dyn Fn(&[f64]) -> Vec<f64>, with_load: bool| {
             let of = |log: &super::NormalLoadLog| {
                 let time: Vec<f64> = log.time_s.iter().map(|t| t / s.time_s).collect();
-                let drift = saturating(&time, 1.0, bend);
                 let load = |i: usize| if with_load { log.filtered_n[i] / s.load_n } else { 1.0 };
-                drift.iter().enumerate().map(|(i, d)| -d * load(i)).collect::<Vec<f64>>()
+                course(&time).iter().enumerate().map(|(i, d)| -d * load(i)).collect::<Vec<f64>>()
             };
             view.logs.iter().flat_map(of).collect::<Vec<f64>>()
         };
-        let columns = [false, true].into_iter().flat_map(|load| BENDS.map(|b| over_time(b, load))).collect();
-        let parameters = ["zero_nm", "gain_nm"]
-            .into_iter()
-            .flat_map(|kind| BENDS.map(|b| Parameter::amplitude(format!("normal_{kind}_{b}"), s.torque_nm)))
-            .collect();
-        vec![Alternative::columns(self.id(), parameters, columns)]
+        self.alternatives("normal", s.torque_nm, over_time)
+    }
+}
+
+impl BridgeDrift {
+    /// Each course as a form of a balance that is linear in its parts.
+    fn alternatives(
+        &self,
+        bridge: &str,
+        size_nm: f64,
+        over_time: impl Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> Vec<f64>,
+    ) -> Vec<Alternative> {
+        let of_course = |course: Course| {
+            let parameters = course.parameters(bridge, ["zero_nm", "gain_nm"], size_nm);
+            Alternative {
+                form: format!("{bridge}, {}", if matches!(course, Course::Settles) { "settling" } else { "wandering" }),
+                log_prior: -(Course::ALL.len() as f64).ln(),
+                ..Alternative::columns(self.id(), parameters, course.columns(&over_time).concat())
+            }
+        };
+        Course::ALL.into_iter().map(of_course).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::identify::linear;
+
+    /// What a course leaves of a drift, relative to it.
+    fn left(course: Course, drift: &dyn Fn(f64) -> f64) -> f64 {
+        const POINTS: usize = 400;
+        let time: Vec<f64> = (0..POINTS).map(|i| i as f64 / POINTS as f64).collect();
+        let drift: Vec<f64> = time.iter().map(|t| drift(*t)).collect();
+        let columns: Vec<Vec<f64>> = (0..course.parts().len()).map(|part| course.part(part, &time)).collect();
+        let (h, g) = linear::normal_equations(&columns, &[1.0; POINTS], &drift);
+        let p: DVector<f64> = linear::factor(&h).solve(&g);
+        let all: f64 = drift.iter().map(|x| x * x).sum();
+        ((all - p.dot(&g)) / all).max(0.0).sqrt()
+    }
+
+    #[test]
+    fn one_course_settles_and_the_other_turns_back() {
+        let settles = |t: f64| 1.0 - (-t / 0.05).exp();
+        let [settling, wandering] = Course::ALL.map(|course| left(course, &settles));
+        assert!(settling < 0.05 && wandering > 2.0 * settling, "{settling} {wandering}");
+        // A room that warms and cools one and a half times in the log.
+        let turns_back = |t: f64| (1.5 * TAU * t + 0.7).sin() - 0.7f64.sin();
+        let [settling, wandering] = Course::ALL.map(|course| left(course, &turns_back));
+        assert!(wandering < 0.05 && settling > 0.3, "{settling} {wandering}");
+    }
+
+    #[test]
+    fn a_steady_drift_is_the_cores_whichever_course_told_it() {
+        for course in Course::ALL {
+            let count = course.parts().len();
+            let mut p = vec![0.0; 2 * count];
+            // The last exponential is nearly straight.
+            let steady = if matches!(course, Course::Wanders) { 0 } else { count - 1 };
+            p[steady] = 1.0;
+            p[count + steady] = 0.5;
+            let exported = export(course, &p, "friction", 20.0, 3.0);
+            let value = |name: &str| exported.iter().find(|(other, _)| other == name).map(|found| found.1);
+            let near = |found: Option<f64>, rate: f64| found.is_some_and(|found| (found / rate - 1.0).abs() < 0.1);
+            assert!(near(value("friction_zero_nm_per_s"), 3.0 / 20.0), "{exported:?}");
+            assert!(near(value("friction_gain_per_s"), 0.5 / 20.0), "{exported:?}");
+            assert_eq!(value("normal_zero_n_per_s"), Some(0.0));
+        }
     }
 }

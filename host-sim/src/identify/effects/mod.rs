@@ -45,6 +45,9 @@ pub struct DriveView<'a> {
     pub inertia: f64,
     /// Shape found on other logs: only this one is wanted.
     pub fixed: Option<&'a [(String, f64)]>,
+    /// What bears on the motor beside its inertia and a coupling by the values found on other logs: a shape that was found
+    /// there needs it.
+    pub bearing: Option<&'a [f64]>,
 }
 
 /// Shapes that are tried: those of a grid, or the one that was found on other logs.
