@@ -51,8 +51,8 @@ pub(super) fn innovations(
             p22 -= l * p12;
             p12 -= k * p12;
             p11 -= k * p11;
-            let within =
-                MOST_DEVIATIONS * struck[0].max(0.0).sqrt() / x.hypot(y / omega).max(f64::MIN_POSITIVE);
+            let within = MOST_DEVIATIONS * struck[0].max(0.0).sqrt()
+                / (x * x + (y / omega).powi(2)).sqrt().max(f64::MIN_POSITIVE);
             (x, y) = (x * within.min(1.0), y * within.min(1.0));
         }
         known = [p11, p12, p22];
