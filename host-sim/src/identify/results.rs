@@ -346,10 +346,9 @@ fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Ca
     for (part, errors) in found.holdout {
         if let (true, Some([base, extended, noise])) = (acting(judged, *part).contains(&id), errors.nrmse()) {
             evidence.push(format!(
-                "on the held-out logs the error of the {} falls from {} to {}; noise alone leaves {}",
+                "on the held-out logs the error of the {} {}; noise alone leaves {}",
                 part.name(),
-                percent(base),
-                percent(extended),
+                moves(base, extended),
                 percent(noise)
             ));
         }
@@ -449,6 +448,16 @@ fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>], apart: &[Apar
     }
 }
 
+/// How an error changes: what is fitted to other logs may make it larger too.
+fn moves(from: f64, to: f64) -> String {
+    let (before, after) = (percent(from), percent(to));
+    if before == after {
+        format!("stays at {after}")
+    } else {
+        format!("{} from {before} to {after}", if to > from { "rises" } else { "falls" })
+    }
+}
+
 fn sentence(
     verdict: &str,
     causes: &[Cause],
@@ -458,15 +467,15 @@ fn sentence(
     apart: &[Apart],
 ) -> String {
     let text = |x: Option<f64>| x.map_or("unknown".to_string(), percent);
+    let error = base.holdout_nrmse.zip(extended.holdout_nrmse);
     match verdict {
         "named" => {
             let names: Vec<String> =
                 causes.iter().map(|c| format!("{} ({:.1} %)", c.id, 100.0 * c.probability)).collect();
             format!(
-                "The cause is {}: with it the error on the held-out logs falls from {} to {}; noise alone leaves {}.",
+                "The cause is {}: with it the error on the held-out logs {}; noise alone leaves {}.",
                 names.join(" and "),
-                text(base.holdout_nrmse),
-                text(extended.holdout_nrmse),
+                error.map_or("is unknown".to_string(), |(base, extended)| moves(base, extended)),
                 text(extended.noise_floor_nrmse)
             )
         }
@@ -477,5 +486,17 @@ fn sentence(
             text(base.holdout_nrmse),
             text(extended.noise_floor_nrmse)
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_that_grows_is_not_said_to_fall() {
+        assert_eq!(moves(0.052, 0.0031), "falls from 5.20 % to 0.31 %");
+        assert_eq!(moves(0.0102, 0.0139), "rises from 1.02 % to 1.39 %");
+        assert_eq!(moves(0.01021, 0.01019), "stays at 1.02 %");
     }
 }
