@@ -268,3 +268,62 @@ pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<
     ]);
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+    use crate::identify::filters::rms;
+
+    const COUNT: usize = 4000;
+    const STEP_S: f64 = 1e-3;
+    const MODE: (f64, f64) = (60.0, 0.02);
+
+    /// Every 400 samples it steps.
+    fn torque(i: usize) -> f64 {
+        if (i / 400).is_multiple_of(2) { 1.0 } else { 2.0 }
+    }
+
+    /// What a ring shows of it.
+    fn shown() -> Vec<f64> {
+        const FINER: usize = 20;
+        let omega = std::f64::consts::TAU * MODE.0;
+        let dt = STEP_S / FINER as f64;
+        let (mut angle, mut rate) = (torque(0), 0.0);
+        let of = |i: usize| {
+            let now = angle;
+            for _ in 0..FINER {
+                rate += dt * (omega * omega * (torque(i) - angle) - 2.0 * MODE.1 * omega * rate);
+                angle += dt * rate;
+            }
+            now
+        };
+        (0..COUNT).map(of).collect()
+    }
+
+    #[test]
+    fn the_drive_sees_the_torque_behind_a_ring_and_none_beyond_an_end() {
+        let shown = shown();
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..COUNT).map(|i| STEP_S * i as f64).collect());
+        log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
+        log.set_signal(Signal::NormalForce, vec![80.0; COUNT]);
+        log.set_signal(Signal::FrictionTorque, shown.clone());
+        let logs = [ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()];
+        assert!(behind_channel(&logs, &Change::default()).is_none());
+        let change = Change { mode: Some(MODE), ends_nm: Some((0.0, 2.5)), ..Change::default() };
+        let seen = &behind_channel(&logs, &change).expect("it rings and has an end")[0];
+        // Between the steps, whose edges a filter rounds.
+        let off = |values: &[f64]| {
+            let between = (20..COUNT).filter(|i| (20..380).contains(&(i % 400)));
+            rms(&between.map(|i| values[i] - torque(i)).collect::<Vec<f64>>())
+        };
+        let [behind, before] = [off(&seen.friction_nm), off(&shown)];
+        assert!(behind < 0.1 * before, "{behind} {before}");
+        // A ring that overshoots an end of the range is known no better than one that does not.
+        let beyond = (0..COUNT).find(|i| shown[*i] > 2.6).expect("an overshoot");
+        assert!(!seen.usable[beyond] && seen.usable[200]);
+    }
+}

@@ -236,6 +236,11 @@ mod tests {
         // One that leaves nearly twice what it explains: hardly better than even odds.
         assert!((0.5..0.7).contains(&told(0.02, 0.55).probability));
         assert_eq!(told(0.02, 0.4).effects, ["a"]);
+        // One that explains all that the larger cause leaves has a shape of its own, though it is smaller than a law may be wrong.
+        assert_eq!(told(0.005, 9.0).effects, ["a", "b"]);
+        assert_eq!(told(0.005, 1.0).effects, ["a"]);
+        // But nothing is smaller than what the form of the model is known to.
+        assert_eq!(told(0.0035, 99.0).effects, ["a"]);
         // A large one is none, whatever another cause leaves beside it.
         assert_eq!(told(0.05, 0.1).effects, ["a", "b"]);
     }
