@@ -171,21 +171,14 @@ mod tests {
 
     #[test]
     fn bounds_are_let_go_again_where_that_lowers_the_sum() {
-        // Stops of a hysteresis: columns that are nearly one another, of which two make the signal.
+        // Laws that saturate at widths close to each other: columns that are nearly one another, of which two make the signal.
         let rows = 400;
-        let stop = |width: f64| {
-            let mut state = 0.0_f64;
+        let saturates = |width: f64| -> Vec<f64> {
             let input = (0..rows).map(|i| (0.05 * f64::from(i)).sin() + 0.3 * (0.21 * f64::from(i)).sin());
-            let mut last = 0.0;
-            input
-                .map(|x| {
-                    state = (state + x - last).clamp(-width, width);
-                    last = x;
-                    state / width
-                })
-                .collect::<Vec<f64>>()
+            input.map(|x| (x / width).clamp(-1.0, 1.0)).collect()
         };
-        let columns: Vec<Vec<f64>> = (0..13).map(|i| stop(0.01 * 2f64.powf(0.5 * f64::from(i)))).collect();
+        let columns: Vec<Vec<f64>> =
+            (0..13).map(|i| saturates(0.01 * 2f64.powf(0.5 * f64::from(i)))).collect();
         let noise = crate::identify::noise::tests::white(rows as usize, 7);
         let y: Vec<f64> =
             (0..rows as usize).map(|k| columns[4][k] + 0.5 * columns[9][k] + 0.02 * noise[k]).collect();

@@ -174,4 +174,20 @@ mod tests {
         assert!(share(&signed) < 0.05 && bins.share(&signed, &sign) > 0.98);
         assert!((bins.slopes(&signed, &sign)[0] - bins.means(&follows)[0]).abs() < 1e-9);
     }
+
+    #[test]
+    fn means_of_few_samples_explain_nothing_of_noise() {
+        // Forty means of twenty samples take a twentieth of any noise.
+        let over: Vec<f64> = (0..800).map(f64::from).collect();
+        let bins = Bins::new(&over, (0..800).collect()).unwrap();
+        // Even noise from a linear congruence (Knuth's MMIX).
+        let mut state = 1u64;
+        let mut noise = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let shares = (0..20).map(|_| bins.share(&(0..800).map(|_| noise()).collect::<Vec<f64>>(), &|_| 1.0));
+        let mean = shares.sum::<f64>() / 20.0;
+        assert!(mean < 0.02, "{mean}");
+    }
 }
