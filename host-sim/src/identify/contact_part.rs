@@ -190,22 +190,22 @@ fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], contributions: &[Vec<C
 /// What the drive's balance sees of the friction channel: no torque where it shows an end of its range, and the torque itself
 /// where its sensor rings. `None` where it does neither.
 pub fn behind_channel(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
-    let torque_nm = |log: &ContactLog| before_ringing(&log.friction_nm, change.mode?, log.grid.step_s);
-    let rings = logs.first().is_some_and(|log| torque_nm(log).is_some());
-    if change.ends_nm.is_none() && !rings {
+    let behind = |log: &ContactLog| before_ringing(&log.friction_nm, change.mode?, log.grid.step_s);
+    let torques_nm: Vec<Option<Vec<f64>>> = logs.iter().map(behind).collect();
+    if change.ends_nm.is_none() && torques_nm.iter().all(Option::is_none) {
         return None;
     }
-    let seen = |log: &ContactLog| {
-        let mut seen = log.clone();
+    let mut seen = logs.to_vec();
+    for (log, torque_nm) in seen.iter_mut().zip(torques_nm) {
+        // The end is one of what the channel shows.
         if let Some(ends) = change.ends_nm {
-            seen.leave_out_ends(ends);
+            log.leave_out_ends(ends);
         }
-        if let Some(torque_nm) = torque_nm(log) {
-            seen.friction_nm = torque_nm;
+        if let Some(torque_nm) = torque_nm {
+            log.friction_nm = torque_nm;
         }
-        seen
-    };
-    Some(logs.iter().map(seen).collect())
+    }
+    Some(seen)
 }
 
 /// Where the normal channel shows its end, the actuator's balance has no normal force; `None` where it does not.
@@ -271,6 +271,8 @@ pub fn coordinates_of(logs: &[ContactLog], scales: &Scales) -> Vec<(String, Vec<
 
 #[cfg(test)]
 mod tests {
+    use model_core::sensor::{SecondOrder, SecondOrderState};
+
     use super::*;
     use crate::files::log::Log;
     use crate::files::rig_file::RigFile;
@@ -288,19 +290,9 @@ mod tests {
 
     /// What a ring shows of it.
     fn shown() -> Vec<f64> {
-        const FINER: usize = 20;
-        let omega = std::f64::consts::TAU * MODE.0;
-        let dt = STEP_S / FINER as f64;
-        let (mut angle, mut rate) = (torque(0), 0.0);
-        let of = |i: usize| {
-            let now = angle;
-            for _ in 0..FINER {
-                rate += dt * (omega * omega * (torque(i) - angle) - 2.0 * MODE.1 * omega * rate);
-                angle += dt * rate;
-            }
-            now
-        };
-        (0..COUNT).map(of).collect()
+        let ring = SecondOrder::new(MODE.0, MODE.1, STEP_S);
+        let mut state = SecondOrderState::holding(torque(0));
+        (0..COUNT).map(|i| ring.step(&mut state, torque(i))).collect()
     }
 
     #[test]

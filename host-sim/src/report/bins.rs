@@ -134,6 +134,7 @@ pub fn chart(over_title: &str, over: &[f64], title: &str, series: &[Series<'_>])
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::noise::White;
 
     #[test]
     fn every_bin_has_its_mean_and_its_count_and_bad_samples_are_in_none() {
@@ -180,13 +181,9 @@ mod tests {
         // Forty means of twenty samples take a twentieth of any noise.
         let over: Vec<f64> = (0..800).map(f64::from).collect();
         let bins = Bins::new(&over, (0..800).collect()).unwrap();
-        // Even noise from a linear congruence (Knuth's MMIX).
-        let mut state = 1u64;
-        let mut noise = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
-        let shares = (0..20).map(|_| bins.share(&(0..800).map(|_| noise()).collect::<Vec<f64>>(), &|_| 1.0));
+        let mut noise = White::new(1);
+        let mut values = || (0..800).map(|_| noise.next()).collect::<Vec<f64>>();
+        let shares = (0..20).map(|_| bins.share(&values(), &|_| 1.0));
         let mean = shares.sum::<f64>() / 20.0;
         assert!(mean < 0.02, "{mean}");
     }

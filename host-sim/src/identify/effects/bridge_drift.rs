@@ -29,6 +29,14 @@ enum Course {
 impl Course {
     const ALL: [Self; 2] = [Self::Settles, Self::Wanders];
 
+    /// The name of its form, of those for the two.
+    fn form(self, [settles, wanders]: [&'static str; 2]) -> &'static str {
+        match self {
+            Self::Settles => settles,
+            Self::Wanders => wanders,
+        }
+    }
+
     /// Its parts: names and largest values.
     fn parts(self) -> Vec<(String, f64)> {
         match self {
@@ -139,14 +147,10 @@ impl Effect for BridgeDrift {
                 over_time(part, &|at, i| if gain { 1.0 } else { load(at, i) })
             });
             let named = |bridge: &str| course.parameters(bridge, ["zero", "gain"], 1.0);
-            let forms = match course {
-                Course::Settles => ["friction", "normal"],
-                Course::Wanders => ["friction wanders", "normal wanders"],
-            };
             [
-                ContactTerm::amplifier(self.id(), forms[0], friction, named("friction"))
+                ContactTerm::amplifier(self.id(), course.form(["friction", "friction wanders"]), friction, named("friction"))
                     .exported(move |p, _| export(course, p, "friction", s_time, s_torque)),
-                ContactTerm::factor(self.id(), forms[1], normal.concat(), named("normal"))
+                ContactTerm::factor(self.id(), course.form(["normal", "normal wanders"]), normal.concat(), named("normal"))
                     .exported(move |p, _| export(course, p, "normal", s_time, s_load)),
             ]
         };
@@ -196,7 +200,7 @@ impl BridgeDrift {
         let of_course = |course: Course| {
             let parameters = course.parameters(bridge, ["zero_nm", "gain_nm"], size_nm);
             Alternative {
-                form: format!("{bridge}, {}", if matches!(course, Course::Settles) { "settling" } else { "wandering" }),
+                form: format!("{bridge}, {}", course.form(["settling", "wandering"])),
                 log_prior: -(Course::ALL.len() as f64).ln(),
                 ..Alternative::columns(self.id(), parameters, course.columns(&over_time).concat())
             }
