@@ -13,6 +13,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::signal::{SIGNALS, Signal};
+use super::speed_lag::{self, Lag};
 use super::{import, log_check, log_csv, log_mcap, log_parquet, plausible};
 use crate::input_error::InputError;
 
@@ -222,7 +223,18 @@ impl Log {
         }
     }
 
-    /// The signals of a contact log. Speed is taken from the angle where there is no speed column:
+    /// By how much the speed lags the angle, where it surely does.
+    pub fn speed_lag(&self) -> Option<Lag> {
+        let (speed, angle) = (self.signal(Signal::M2Speed)?, self.signal(Signal::M2Angle)?);
+        speed_lag::lag(self.time_s(), speed, angle)
+    }
+
+    /// The speed column, where there is one that is in time with the angle.
+    pub fn speed_in_time(&self) -> Option<&[f64]> {
+        self.signal(Signal::M2Speed).filter(|_| self.speed_lag().is_none())
+    }
+
+    /// The signals of a contact log. Speed is taken from the angle where there is no speed column that is in time with it:
     /// the slope of the parabola through a sample and its neighbours.
     pub fn contact(&self) -> Result<ContactSignals<'_>, InputError> {
         let time_s = self.require(Signal::Time)?;
@@ -230,7 +242,7 @@ impl Log {
             .into_iter()
             .filter(|signal| self.signal(*signal).is_none())
             .collect();
-        let m2_speed_rad_s = match (self.signal(Signal::M2Speed), self.signal(Signal::M2Angle)) {
+        let m2_speed_rad_s = match (self.speed_in_time(), self.signal(Signal::M2Angle)) {
             (Some(speed), _) => Cow::Borrowed(speed),
             (None, Some(angle)) => Cow::Owned(slope(time_s, angle)),
             (None, None) => return Err(self.missing(&[&[Signal::M2Speed], missing.as_slice()].concat())),

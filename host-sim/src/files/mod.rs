@@ -20,6 +20,7 @@ pub mod overrides;
 pub mod plausible;
 pub mod rig_file;
 pub mod signal;
+pub mod speed_lag;
 pub mod strain_gauges;
 pub mod toml_tree;
 #[cfg(feature = "parquet")]

@@ -29,8 +29,6 @@ pub struct ContactLog {
     pub radius_m: f64,
     /// Angle of the disc, from angle and speed columns.
     pub angle_rad: Vec<f64>,
-    /// Speed of the disc as logged (or from its angle).
-    pub speed_rad_s: Vec<f64>,
     /// Way of the element's root over the road, m.
     pub root_m: Vec<f64>,
     /// Its speed, smoothed over a few samples, m/s.
@@ -92,11 +90,9 @@ impl ContactLog {
         let friction_noise_nm = grid.white_noise(&friction_nm, signals.friction_torque_nm);
         let normal_noise_n = grid.noise(&normal_n, signals.normal_force_n);
 
-        let speed_column = log.signal(Signal::M2Speed).map(&on_grid);
+        let speed_column = log.speed_in_time().map(&on_grid);
         let angle_column = log.signal(Signal::M2Angle).map(|angle| on_grid(&unwrapped(angle)));
         let (angle_rad, speed_noise) = motion(&grid, speed_column.as_deref(), angle_column.as_deref());
-        let speed_rad_s =
-            speed_column.unwrap_or_else(|| gradient(&angle_rad).iter().map(|d| d / step_s).collect());
         let radius_m = rig.friction_radius_m;
         let root_m: Vec<f64> = angle_rad.iter().map(|a| radius_m * a).collect();
         let speed: Vec<f64> = gradient(&root_m).iter().map(|d| d / step_s).collect();
@@ -125,7 +121,6 @@ impl ContactLog {
             grid,
             radius_m,
             angle_rad,
-            speed_rad_s,
             root_m,
             load_n,
             load_change_n,
