@@ -66,6 +66,8 @@ pub struct Alternative {
     pub log_prior: f64,
     /// What its law follows, with its unit, where no coordinate of the balance is that.
     pub coordinate: Option<(String, Vec<f64>)>,
+    /// Whether it is an error of a channel as another balance tells it: known there.
+    pub told: bool,
 }
 
 impl Alternative {
@@ -88,6 +90,7 @@ impl Alternative {
             constants: Vec::new(),
             log_prior: 0.0,
             coordinate: None,
+            told: false,
         }
     }
 }
@@ -227,6 +230,11 @@ impl Balance {
 
     /// Solves these forms; the set of what it gives is empty.
     pub fn solve_forms(&self, chosen: &[&Alternative]) -> Solved {
+        self.solve_near(chosen, None)
+    }
+
+    /// The same from the weights of a solution that is near.
+    pub fn solve_near(&self, chosen: &[&Alternative], near: Option<&Solved>) -> Solved {
         let mut response = self.response.clone();
         let base = self.base.iter().map(|b| &b.1);
         let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
@@ -247,7 +255,10 @@ impl Balance {
         let x: Vec<Vec<f64>> =
             columns.iter().map(|c| self.used.iter().map(|&i| c[i] / self.deviation[i]).collect()).collect();
         let n = parameters.len();
-        let mut w = vec![1.0; y.len()];
+        let weight = |r: f64| (FREEDOM + 1.0) / (FREEDOM + r * r);
+        let of_near =
+            |near: &Solved| self.used.iter().map(|&i| weight(near.residual[i] / self.deviation[i])).collect();
+        let mut w: Vec<f64> = near.map_or_else(|| vec![1.0; y.len()], of_near);
         let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
         let mut r = y.clone();
         let (mut h, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -269,7 +280,7 @@ impl Balance {
             for (c, p) in x.iter().zip(&p) {
                 r.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
             }
-            w.iter_mut().zip(&r).for_each(|(w, r)| *w = (FREEDOM + 1.0) / (FREEDOM + r * r));
+            w.iter_mut().zip(&r).for_each(|(w, r)| *w = weight(*r));
             if step.dot(&(&a * &step)) < CONVERGED {
                 break;
             }
@@ -395,8 +406,10 @@ impl<'a> Company<'a> {
 /// Orders and shapes are looked for where nothing else stands, and once more beside what was found: a mode that was fitted
 /// to another cause's torque is not the coupling's.
 pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<Alternative>, Vec<Solved>) {
-    let residual = balance.solve(&[], &[]).residual;
-    let mut alternatives = propose(balance, Company { forms: &[], residual: &residual }, &|_| true);
+    let alone = balance.solve(&[], &[]);
+    balance.refit_noise(&alone);
+    let mut alternatives = propose(balance, Company { forms: &[], residual: &alone.residual }, &|_| true);
+    balance.forget_residuals();
     let found = search_sets(balance, &alternatives, most);
     let best = &found[0].set;
     let effect = |place: &usize| alternatives[*place].effect;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::balance::Alternative;
 use super::contact::baseline;
 use super::contact::change::{Change, ContactTerm};
-use super::contact::channel::before_ringing;
+use super::contact::channel::{before_ringing, error_nm};
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
@@ -84,18 +84,58 @@ impl ContactPart {
 
     /// What an effect changes in a candidate, and the contact's numbers there.
     pub fn change_by(&self, place: usize, effect: &str) -> Option<(Change, Numbers)> {
+        Some((self.change_in(&self.terms, place, effect)?, self.baseline.numbers(&self.fit(place).p)))
+    }
+
+    /// What an effect changes, with the values of a candidate, in the logs that these terms were made for.
+    fn change_in(&self, terms: &[ContactTerm], place: usize, effect: &str) -> Option<Change> {
         let fit = self.fit(place);
         let mut at = self.baseline.free.len();
-        for term in fit.terms.iter().map(|t| &self.terms[*t]) {
-            let values = &fit.p[at..at + term.parameters.len()];
-            if term.effect == effect {
+        for own in fit.terms.iter().map(|t| &self.terms[*t]) {
+            let values = &fit.p[at..at + own.parameters.len()];
+            if own.effect == effect {
+                let term = terms.iter().find(|term| term.effect == own.effect && term.form == own.form)?;
                 let mut change = Change::default();
                 (term.act)(values, &mut change);
-                return Some((change, self.baseline.numbers(&fit.p)));
+                return Some(change);
             }
-            at += term.parameters.len();
+            at += own.parameters.len();
         }
         None
+    }
+
+    /// Effects of a candidate.
+    fn effects(&self, place: usize) -> impl Iterator<Item = &'static str> + '_ {
+        self.fit(place).terms.iter().map(|term| self.terms[*term].effect)
+    }
+
+    /// What the friction channel shows too much by each effect that changes it, as the best set with the effect says: N m,
+    /// log by log, for these logs.
+    pub fn channel_errors(&self, logs: &[ContactLog], training: bool) -> Vec<(&'static str, Vec<Vec<f64>>)> {
+        let own = (!training).then(|| contact_terms(logs, &self.scales, false, self.logs.len(), self.block));
+        let terms = own.as_ref().unwrap_or(&self.terms);
+        let mut out: Vec<(&'static str, Vec<Vec<f64>>)> = Vec::new();
+        for place in 0..self.ranked.len() {
+            for effect in self.effects(place) {
+                if out.iter().all(|(known, _)| *known != effect) {
+                    let change = self.change_in(terms, place, effect);
+                    let error = change.and_then(|change| error_nm(logs, &change));
+                    out.extend(error.map(|error| (effect, error)));
+                }
+            }
+        }
+        out
+    }
+
+    /// Which of these effects stand together in a set.
+    pub fn together(&self, effects: &[&'static str]) -> Vec<Vec<&'static str>> {
+        let of_set =
+            |place| self.effects(place).filter(|effect| effects.contains(effect)).collect::<Vec<_>>();
+        let mut sets: Vec<Vec<&'static str>> = (0..self.ranked.len()).map(of_set).collect();
+        sets.iter_mut().for_each(|set| set.sort_unstable());
+        sets.sort();
+        sets.dedup();
+        sets
     }
 
     /// The fit of a candidate.

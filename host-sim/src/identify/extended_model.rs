@@ -219,7 +219,8 @@ fn with_numbers(
 pub fn linear_values(part: &Linear, place: usize) -> Values {
     let solved = &part.solved[place];
     let mut out = Values::new();
-    for (alternative, places) in solved.forms(&part.alternatives) {
+    // What the contact tells has its numbers there.
+    for (alternative, places) in solved.forms(&part.alternatives).filter(|(form, _)| !form.told) {
         let entry = out.entry(alternative.effect).or_default();
         for (q, i) in alternative.parameters.iter().zip(places) {
             entry.insert(q.name.clone(), Value { value: solved.p[i], std: Some(solved.std(i)) });

@@ -115,6 +115,7 @@ pub fn errors(
         let fit = contact.fit(place);
         let change = contact.problem().change(&fit.terms, &fit.p);
         let sensed = contact_part::behind_channel(&prepared, &change);
+        let told = contact.channel_errors(sensed.as_ref().unwrap_or(&prepared), training);
         let drives: Option<Vec<DriveLog>> = sensed
             .as_ref()
             .unwrap_or(&prepared)
@@ -126,7 +127,7 @@ pub fn errors(
                 if training {
                     Some(contact.logs.clone())
                 } else {
-                    let (_, fixed) = drive_alternatives(found, drive, drives, Some(rig));
+                    let (_, fixed) = drive_alternatives(found, drive, drives, Some(rig), &told);
                     let solved = &drive.solved[found.place(Part::Drive).unwrap_or(0)];
                     let forms = known_forms(drive, solved, &fixed).filter_map(|(form, p)| Some((form, p?)));
                     contact_part::following(&prepared, forms)
@@ -138,7 +139,7 @@ pub fn errors(
         let following = following.as_ref().unwrap_or(&prepared);
         out.push((Part::Friction, contact_errors(contact, place, &prepared, following, training)));
         if let (Some(drive), Some(drives)) = (&found.drive, drives) {
-            out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), training)));
+            out.push((Part::Drive, drive_errors(found, drive, &drives, Some(rig), &told, training)));
         }
         let sensed = contact_part::without_normal_end(&prepared, &change);
         let load_logs: Option<Vec<NormalLoadLog>> =
@@ -154,7 +155,7 @@ pub fn errors(
         // Through the filter of the training logs.
         let inertia = drive.solved.iter().find(|s| s.set.is_empty()).map_or(0.0, |s| s.p[drive::INERTIA]);
         let drives = logs.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
-        out.push((Part::Drive, drive_errors(found, drive, &drives, None, training)));
+        out.push((Part::Drive, drive_errors(found, drive, &drives, None, &[], training)));
     }
     Ok(out)
 }
@@ -288,6 +289,7 @@ fn drive_errors(
     part: &Linear,
     logs: &[DriveLog],
     rig: Option<&RigFile>,
+    told: &[(&'static str, Vec<Vec<f64>>)],
     training: bool,
 ) -> Errors {
     let place = found.place(Part::Drive).unwrap_or(0);
@@ -302,17 +304,19 @@ fn drive_errors(
             part.balance.row_step_s,
         );
     }
-    let (balance, fixed) = drive_alternatives(found, part, logs, rig);
+    let (balance, fixed) = drive_alternatives(found, part, logs, rig, told);
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
     linear_errors(&names, &balance, &base, &extended, balance.row_step_s)
 }
 
-/// The balance of held-out logs, and the forms of the drive's causes there with the training logs' shapes.
+/// The balance of held-out logs, and the forms of the drive's causes there with the training logs' shapes; `told` is what the
+/// contact says of the friction channel there.
 fn drive_alternatives(
     found: &Judgement,
     part: &Linear,
     logs: &[DriveLog],
     rig: Option<&RigFile>,
+    told: &[(&'static str, Vec<Vec<f64>>)],
 ) -> (Balance, Vec<Alternative>) {
     let prior = rig.map(linear_part::drive_prior).unwrap_or_default();
     let scales = DriveScales::new(logs);
@@ -339,10 +343,13 @@ fn drive_alternatives(
         };
         effects::with_id(own.effect).into_iter().flat_map(|e| e.drive(&view)).collect()
     };
-    let chosen = solved.set.iter().map(|chosen| &part.alternatives[*chosen]);
+    let (heard, chosen): (Vec<&Alternative>, Vec<&Alternative>) =
+        solved.set.iter().map(|chosen| &part.alternatives[*chosen]).partition(|own| own.told);
     let (couplings, others): (Vec<&Alternative>, Vec<&Alternative>) =
-        chosen.partition(|own| own.is_coupling());
+        chosen.into_iter().partition(|own| own.is_coupling());
     let mut fixed: Vec<Alternative> = others.into_iter().flat_map(|own| known(own, None)).collect();
+    let told = told.iter().filter(|(effect, _)| heard.iter().any(|own| own.effect == *effect));
+    fixed.extend(told.map(|(effect, error_nm)| linear_part::told(effect, logs, error_nm)));
     if !couplings.is_empty() {
         // What is in the shaft is the motor's torque less its inertia and what else bears on it.
         let mut bearing = vec![0.0; balance.response.len()];

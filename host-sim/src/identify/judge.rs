@@ -131,10 +131,11 @@ fn of_contact_logs(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Found, InputError> {
     let logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+    let drive_logs = |logs: &[ContactLog]| -> Option<Vec<DriveLog>> {
+        logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect()
+    };
     let of_drive = |logs: &[ContactLog]| -> Option<Linear> {
-        let drives: Option<Vec<DriveLog>> =
-            logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect();
-        Some(linear_part::search_drive(&drives?, &linear_part::drive_prior(rig), true))
+        Some(linear_part::search_drive(&drive_logs(logs)?, &linear_part::drive_prior(rig), true))
     };
     let of_normal_load = |logs: &[ContactLog]| -> Option<Linear> {
         let logs: Option<Vec<NormalLoadLog>> = logs.iter().map(NormalLoadLog::new).collect();
@@ -157,8 +158,12 @@ fn of_contact_logs(
     if let Some(seen) = contact_part::without_normal_end(&contact.logs, &best) {
         normal_load = of_normal_load(&seen);
     }
-    if let Some(seen) = contact_part::behind_channel(&contact.logs, &best) {
-        drive = of_drive(&seen);
+    let seen = contact_part::behind_channel(&contact.logs, &best);
+    if let Some(seen) = &seen {
+        drive = of_drive(seen);
+    }
+    if let (Some(drive), Some(logs)) = (&mut drive, drive_logs(seen.as_ref().unwrap_or(&contact.logs))) {
+        drive.tell(&logs, &contact);
     }
     Ok(Found { contact: Some(contact), drive, normal_load, notes })
 }

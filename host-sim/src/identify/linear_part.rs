@@ -1,12 +1,16 @@
 //! A balance that is linear in its parameters, searched: the drive's and the normal-load actuator's.
 
+use rayon::prelude::*;
+
 use super::balance::{self, Alternative, Balance, Company, Solved};
+use super::contact_part::ContactPart;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::{DriveView, LIBRARY, NormalLoadView};
 use super::law_form::LAW_FORM;
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Contribution, Rest};
 use super::table::{Candidate, MOST_CAUSES};
+use super::term::Parameter;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
@@ -22,8 +26,6 @@ pub struct Linear {
     pub alternatives: Vec<Alternative>,
     /// Sets, best first.
     pub solved: Vec<Solved>,
-    /// RMS of the response over its rows.
-    pub signal: f64,
     /// What its effects may follow, with units.
     pub coordinates: Vec<(String, Vec<f64>)>,
     /// Its unit.
@@ -37,13 +39,43 @@ pub struct Linear {
 impl Linear {
     /// The best sets and all single causes, for the table.
     pub fn candidates(&self) -> Vec<Candidate> {
-        let wanted = |(place, solved): &(usize, &Solved)| *place < CANDIDATES || solved.set.len() < 2;
+        let wanted = |own: &(usize, &Solved)| wanted(own) || !self.told(own.1).is_empty();
         let of_set = |(place, solved): (usize, &Solved)| {
             let names = solved.set.iter().map(|a| self.alternatives[*a].effect);
             let effects = names.zip(self.contributions(solved)).map(|(effect, own)| (effect, LAW_FORM, own));
-            Candidate::new(place, solved.log_evidence, effects)
+            Candidate { told: self.told(solved), ..Candidate::new(place, solved.log_evidence, effects) }
         };
         self.solved.iter().enumerate().filter(wanted).map(of_set).collect()
+    }
+
+    /// Effects of a set that are told by another balance.
+    fn told(&self, solved: &Solved) -> Vec<&'static str> {
+        let told = solved.set.iter().map(|a| &self.alternatives[*a]).filter(|a| a.told);
+        let mut told: Vec<&'static str> = told.map(|a| a.effect).collect();
+        told.sort_unstable();
+        told
+    }
+
+    /// Adds the sets in which the friction channel is as the contact's sets say that it is. What the channel shows too much is
+    /// no torque: where a set of the contact has such an error, the drive has it too, and by the same numbers.
+    pub fn tell(&mut self, logs: &[DriveLog], contact: &ContactPart) {
+        let errors = contact.channel_errors(&contact.logs, true);
+        let from = self.alternatives.len();
+        self.alternatives.extend(errors.iter().map(|(effect, error_nm)| told(effect, logs, error_nm)));
+        let effects: Vec<&'static str> = errors.iter().map(|(effect, _)| *effect).collect();
+        let place = |effect: &&'static str| from + effects.iter().position(|e| e == effect).unwrap_or(0);
+        let mut sets: Vec<Vec<usize>> = Vec::new();
+        for together in contact.together(&effects).iter().filter(|together| !together.is_empty()) {
+            for own in self.solved.iter().enumerate().filter(wanted).map(|(_, solved)| &solved.set) {
+                let apart = own.iter().all(|a| !together.contains(&self.alternatives[*a].effect));
+                if apart && own.len() + together.len() <= MOST_CAUSES {
+                    sets.push(own.iter().copied().chain(together.iter().map(place)).collect());
+                }
+            }
+        }
+        let solve = |set: &Vec<usize>| self.balance.solve(&self.alternatives, set);
+        let solved: Vec<Solved> = sets.par_iter().map(solve).collect();
+        self.solved.extend(solved);
     }
 
     /// What each alternative of a set does, the others fitted again without it.
@@ -51,7 +83,7 @@ impl Linear {
         let own = |a: &usize| {
             let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
             let without = self.balance.solve(&self.alternatives, &set);
-            rest::contribution(&self.balance, self.signal, &solved.residual, &without.residual)
+            rest::contribution(&self.balance, &solved.residual, &without.residual)
         };
         solved.set.iter().map(own).collect()
     }
@@ -67,6 +99,24 @@ impl Linear {
             solved.set.len(),
             &self.coordinates,
         )
+    }
+}
+
+/// Whether a set enters the table.
+fn wanted((place, solved): &(usize, &Solved)) -> bool {
+    *place < CANDIDATES || solved.set.len() < 2
+}
+
+/// An error of the friction channel as the contact's balance tells it, which is known there as well as a law is.
+pub fn told(effect: &'static str, logs: &[DriveLog], error_nm: &[Vec<f64>]) -> Alternative {
+    let error: Vec<f64> = logs.iter().zip(error_nm).flat_map(|(log, error)| log.filtered(error)).collect();
+    let more = Parameter { amplitude: false, ..Parameter::amplitude("told_too_small", LAW_FORM) };
+    let column = error.iter().map(|e| -e).collect();
+    Alternative {
+        form: "as the contact tells it".into(),
+        response: Some(error),
+        told: true,
+        ..Alternative::columns(effect, vec![more], vec![column])
     }
 }
 
@@ -89,12 +139,10 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
         LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.drive(&view)).collect()
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
-    let signal = balance.rms(&balance.response);
     Linear {
         balance,
         alternatives,
         solved,
-        signal,
         coordinates: drive::coordinates(logs, rotary),
         unit: if rotary { "N m" } else { "N" },
         drive_scales: Some(scales),
@@ -130,12 +178,10 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
         LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.normal_load(&view)).collect()
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
-    let signal = balance.rms(&balance.response);
     Linear {
         balance,
         alternatives,
         solved,
-        signal,
         coordinates: normal_load::coordinates(logs),
         unit: "N m",
         drive_scales: None,

@@ -324,14 +324,14 @@ fn follows(
     out
 }
 
-/// What an alternative does in a linear balance: its size, relative to the signal, from the residuals with and without it. Its
+/// What an alternative does in a linear balance: its size, relative to the efforts that it balances, from the residuals with and without it. Its
 /// columns do not take each other's shape as laws of friction do; that it is no small part of what is left is enough.
-pub fn contribution(balance: &Balance, signal: f64, residual: &[f64], without: &[f64]) -> Contribution {
+pub fn contribution(balance: &Balance, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
     let noise = Noise::white(balance.first_deviation.clone());
     let left = structured(residual, &noise, &balance.used, block).0.sqrt();
     let change = balance.difference(residual, without);
-    Contribution { size: change / signal.max(1e-12), over_rest: change / (LEFT_SHARE * left) }
+    Contribution { size: change / balance.scale.max(1e-12), over_rest: change / (LEFT_SHARE * left) }
 }
 
 /// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set
@@ -381,6 +381,21 @@ mod tests {
         assert_eq!(over(5.0, 3.0), 0.0);
         // Nothing is left; nothing was left without it.
         assert_eq!([over(0.0, 5.0), over(0.0, 0.0)], [f64::INFINITY; 2]);
+    }
+
+    #[test]
+    fn a_cause_is_as_large_as_it_is_to_the_torques_of_whose_difference_it_is_a_part() {
+        const ROWS: usize = 2000;
+        let log = super::super::balance::LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; ROWS],
+            noise: Box::new(|_| vec![0.01]),
+        };
+        // The difference of two torques of 4 N m, which is nothing but an offset of 0.01 N m.
+        let balance = Balance::new(vec![0.01; ROWS], Vec::new(), &[log], 4.0);
+        let size = contribution(&balance, &[0.0; ROWS], &[0.01; ROWS]).size;
+        assert!((size - 0.0025).abs() < 1e-12 && size < MODEL_FORM, "{size}");
     }
 
     #[test]

@@ -53,6 +53,8 @@ pub struct Candidate {
     pub contributions: Vec<Contribution>,
     /// Share of its size that each effect's form here may be wrong by, in the order of `effects`.
     pub forms: Vec<f64>,
+    /// Effects that are here what another balance says that they are.
+    pub told: Vec<&'static str>,
 }
 
 impl Candidate {
@@ -71,6 +73,7 @@ impl Candidate {
             place,
             contributions: effects.iter().map(|e| e.2).collect(),
             forms: effects.iter().map(|e| e.1).collect(),
+            told: Vec::new(),
         }
     }
 }
@@ -121,12 +124,31 @@ fn sorted(mut names: Vec<&'static str>) -> Vec<&'static str> {
     names
 }
 
-/// The best candidate that has no effect but these; of each effect its size there.
-fn within<'c>(candidates: &'c [Candidate], effects: &[&str]) -> Option<&'c Candidate> {
-    candidates
-        .iter()
-        .filter(|c| c.effects.iter().all(|e| effects.contains(e)))
-        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+/// The best candidates that have no effect but these, one of each part: what the contact says of a channel that another part
+/// hears of is so there.
+fn within<'c>(parts: &'c [(Part, Vec<Candidate>)], effects: &[&str]) -> Option<Vec<(Part, &'c Candidate)>> {
+    let allowed = |c: &&Candidate| c.effects.iter().all(|e| effects.contains(e));
+    let best_of = |c: &mut dyn Iterator<Item = &'c Candidate>| {
+        c.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+    };
+    let ((first, own), others) = parts.split_first()?;
+    let mut best: Option<(f64, Vec<(Part, &Candidate)>)> = None;
+    for candidate in own.iter().filter(allowed) {
+        let mut chosen = vec![(*first, candidate)];
+        for (part, candidates) in others {
+            let tells = |effect: &&str| candidates.iter().any(|c| c.told.contains(effect));
+            let told: Vec<&str> = candidate.effects.iter().copied().filter(tells).collect();
+            chosen.extend(
+                best_of(&mut candidates.iter().filter(allowed).filter(|c| c.told == told))
+                    .map(|c| (*part, c)),
+            );
+        }
+        let log_evidence = chosen.iter().map(|(_, c)| c.log_evidence).sum();
+        if chosen.len() == parts.len() && best.as_ref().is_none_or(|(least, _)| log_evidence > *least) {
+            best = Some((log_evidence, chosen));
+        }
+    }
+    best.map(|(_, chosen)| chosen)
 }
 
 /// The table of the balances' candidates, the best hypothesis first, and the effects that are too small for it.
@@ -152,10 +174,9 @@ pub fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall
             let mut sizes = vec![0.0f64; effects.len()];
             let mut over_floor = vec![0.0f64; effects.len()];
             let mut places = Vec::new();
-            for (part, candidates) in parts {
-                let best = within(candidates, &effects)?;
+            for (part, best) in within(parts, &effects)? {
                 log_weight += best.log_evidence;
-                places.push((*part, best.place));
+                places.push((part, best.place));
                 for (own, (effect, what)) in best.effects.iter().zip(&best.contributions).enumerate() {
                     let at = effects.iter().position(|e| e == effect)?;
                     let others = best
@@ -227,6 +248,7 @@ mod tests {
                     [..effects.len()]
                     .to_vec(),
                 forms: vec![LAW_FORM; effects.len()],
+                told: Vec::new(),
             };
             let candidates = vec![candidate(&["a", "b"], 50.0, 0), candidate(&["a"], 0.0, 1)];
             table(&[(Part::Friction, candidates)]).0[0].clone()
@@ -243,6 +265,29 @@ mod tests {
         assert_eq!(told(0.0035, 99.0).effects, ["a"]);
         // A large one is none, whatever another cause leaves beside it.
         assert_eq!(told(0.05, 0.1).effects, ["a", "b"]);
+    }
+
+    #[test]
+    fn what_the_contact_says_of_its_channel_is_so_in_the_drive() {
+        // Two causes explain the contact as well as each other; one of them is an error of its channel.
+        let candidate = |place, effects: &[&'static str], log_evidence: f64, told: &[&'static str]| {
+            let large = Contribution { size: 0.1, over_rest: 9.0 };
+            let named = effects.iter().map(|effect| (*effect, LAW_FORM, large));
+            Candidate { told: told.to_vec(), ..Candidate::new(place, log_evidence, named) }
+        };
+        let of_drive = |with_error: f64| {
+            let contact = vec![
+                candidate(0, &["channel"], 501.0, &[]),
+                candidate(1, &["law"], 500.0, &[]),
+                candidate(2, &[], 0.0, &[]),
+            ];
+            let drive = vec![candidate(0, &[], 0.0, &[]), candidate(1, &["channel"], with_error, &["channel"])];
+            let best = table(&[(Part::Friction, contact), (Part::Drive, drive)]).0[0].clone();
+            (best.effects, best.places[1].1)
+        };
+        // The drive says which of the two it is, and what is named stands in it.
+        assert_eq!(of_drive(-300.0), (vec!["law"], 0));
+        assert_eq!(of_drive(300.0), (vec!["channel"], 1));
     }
 
     #[test]

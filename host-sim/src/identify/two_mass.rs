@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::balance::{Alternative, DiscMotion, Solved};
-use super::contact::problem::FREEDOM;
+use super::contact::problem::{FREEDOM, KEPT_PROMISE};
 use super::coupling::{Coupling, Law};
 use super::drive::{DriveLog, INERTIA};
 use super::effects::DriveView;
@@ -187,19 +187,23 @@ fn stated(
 
 /// The best plain coupling of a grid, and where one is asked for the best of each other shape.
 fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Vec<Alternative> {
-    let trial = |numbers: &Coupling, bearing: &[f64], pull: f64| -> Option<Trial> {
-        let alternative = alternative(effect, view, numbers, bearing, pull)?;
-        let solved = view.balance.solve_forms(&view.company.with(&alternative));
-        Some(Trial { numbers: *numbers, alternative, solved })
-    };
+    let trial_near =
+        |numbers: &Coupling, bearing: &[f64], pull: f64, near: Option<&Solved>| -> Option<Trial> {
+            let alternative = alternative(effect, view, numbers, bearing, pull)?;
+            let solved = view.balance.solve_near(&view.company.with(&alternative), near);
+            Some(Trial { numbers: *numbers, alternative, solved })
+        };
+    let trial = |numbers: &Coupling, bearing: &[f64], pull: f64| trial_near(numbers, bearing, pull, None);
     let refined_by = |start: Trial, bearing: &[f64], pull: f64| {
-        refined(view, start, &|numbers: &Coupling| trial(numbers, bearing, pull))
+        refined(view, start, &|numbers: &Coupling, near: &Solved| {
+            trial_near(numbers, bearing, pull, Some(near))
+        })
     };
     let better = |a: (Trial, f64), b: (Trial, f64)| {
         if a.0.solved.log_evidence + a.1 < b.0.solved.log_evidence + b.1 { b } else { a }
     };
     let best_of = |starts: Vec<Trial>, bearing: &[f64]| -> Option<(Trial, f64)> {
-        starts.into_iter().filter_map(|start| refined_by(start, bearing, PULL)).reduce(better)
+        starts.into_par_iter().filter_map(|start| refined_by(start, bearing, PULL)).reduce_with(better)
     };
     let made = |(best, log_prior): (Trial, f64), bearing: &[f64]| -> Option<Alternative> {
         Some(Alternative { log_prior, ..stated(effect, view, &best.numbers, bearing)? })
@@ -280,7 +284,7 @@ struct Trial {
 fn refined(
     view: &DriveView<'_>,
     start: Trial,
-    trial: &(dyn Fn(&Coupling) -> Option<Trial> + Sync),
+    trial: &(dyn Fn(&Coupling, &Solved) -> Option<Trial> + Sync),
 ) -> Option<(Trial, f64)> {
     let balance = view.balance;
     let scaled = |solved: &Solved| -> Vec<f64> {
@@ -290,49 +294,58 @@ fn refined(
     let mut best = start;
     let mut log_occam = None;
     let mut damping = 1e-2;
+    let mut slopes: Option<Vec<Vec<f64>>> = None;
     for _ in 0..ITERATIONS {
         let p = best.numbers.fitted();
         let r = scaled(&best.solved);
-        let columns: Option<Vec<Vec<f64>>> = (0..p.len())
-            .into_par_iter()
-            .map(|i| {
-                let moved = |step: f64| {
-                    let mut q = p.clone();
-                    q[i] += step;
-                    let there = trial(&best.numbers.with(&q))?;
-                    Some(scaled(&there.solved).iter().zip(&r).map(|(a, b)| (b - a) / step).collect())
-                };
-                // At the end of what is allowed the other way.
-                moved(step).or_else(|| moved(-step))
-            })
-            .collect();
-        let Some(columns) = columns else { break };
+        let fresh = slopes.is_none();
+        let slope = |i: usize| {
+            let moved = |step: f64| {
+                let mut q = p.clone();
+                q[i] += step;
+                let there = trial(&best.numbers.with(&q), &best.solved)?;
+                Some(scaled(&there.solved).iter().zip(&r).map(|(a, b)| (b - a) / step).collect())
+            };
+            // At the end of what is allowed the other way.
+            moved(step).or_else(|| moved(-step))
+        };
+        let taken = slopes.take().or_else(|| (0..p.len()).into_par_iter().map(slope).collect());
+        let Some(columns) = taken else { break };
         let weights: Vec<f64> =
             r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
         let (h, g) = linear::normal_equations(&columns, &weights, &r);
         log_occam = Some(best.numbers.log_occam(&h));
         let mut better = None;
-        for _ in 0..4 {
+        for _ in 0..if fresh { 4 } else { 1 } {
             let mut damped = h.clone();
             for i in 0..p.len() {
                 damped[(i, i)] += damping * h[(i, i)] + f64::MIN_POSITIVE;
             }
             let d = linear::factor(&damped).solve(&g);
-            let excess = d.amax().max(REACH) / REACH;
-            let q: Vec<f64> = p.iter().zip(d.iter()).map(|(p, d)| p + d / excess).collect();
-            let there = trial(&best.numbers.with(&q));
-            better = there.filter(|t| t.solved.log_evidence > best.solved.log_evidence);
+            let d = &d * (REACH / d.amax().max(REACH));
+            let q: Vec<f64> = p.iter().zip(d.iter()).map(|(p, d)| p + d).collect();
+            let there = trial(&best.numbers.with(&q), &best.solved);
+            let gain = there.map(|t| (t.solved.log_evidence - best.solved.log_evidence, t));
+            let promised = BALANCE_SHARE * (g.dot(&d) - 0.5 * d.dot(&(&h * &d)));
+            better = gain.filter(|(gained, _)| *gained > 0.0).map(|(gained, t)| (gained, promised, t));
             if better.is_some() {
                 break;
             }
             damping *= 10.0;
         }
-        let Some(better) = better else { break };
-        let gained = better.solved.log_evidence - best.solved.log_evidence;
-        best = better;
+        let Some((gained, promised, there)) = better else {
+            if fresh {
+                break;
+            }
+            continue;
+        };
+        best = there;
         damping = (0.3 * damping).max(1e-4);
+        if gained > KEPT_PROMISE * promised {
+            slopes = Some(columns);
+        }
         // Half a unit of the likelihood itself changes no decision.
-        if gained < 0.5 * BALANCE_SHARE {
+        if gained < 0.5 * BALANCE_SHARE && (fresh || slopes.is_some()) {
             break;
         }
     }

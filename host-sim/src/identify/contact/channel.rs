@@ -38,6 +38,14 @@ pub fn before_ringing(shown: &[f64], mode: (f64, f64), step_s: f64) -> Option<Ve
     })
 }
 
+/// What a change adds to the torque that the friction channel of each log shows, N m; `None` where it changes neither its
+/// amplifier nor its lateness.
+pub fn error_nm(logs: &[ContactLog], change: &Change) -> Option<Vec<Vec<f64>>> {
+    let changed = change.zero_nm.is_some() || change.gain.is_some() || change.late_s != 0.0;
+    let of_log = |(at, log)| Channel::new(log, at, change, 0.0).error_nm();
+    changed.then(|| logs.iter().enumerate().map(of_log).collect())
+}
+
 /// The channel.
 pub(super) struct Channel<'a> {
     log: &'a ContactLog,
@@ -67,6 +75,16 @@ impl<'a> Channel<'a> {
     /// How late it is, samples.
     pub(super) fn late(&self) -> f64 {
         self.late
+    }
+
+    /// What its amplifier and its lateness add to the torque that it shows, N m, taken ahead by the rig file's delay.
+    pub(super) fn error_nm(&mut self) -> Vec<f64> {
+        let log = self.log;
+        let mut shown_nm = shifted(&log.friction_nm, log.friction_late);
+        let delayed = self.before_delay(Cow::Borrowed(&log.friction_nm));
+        let torque_nm = self.before_amplifier(delayed);
+        shown_nm.iter_mut().zip(torque_nm.iter()).for_each(|(shown, torque)| *shown -= torque);
+        shown_nm
     }
 
     /// The torque that acted, N m, but for what the ends of the range took.

@@ -35,7 +35,7 @@ const WELL_KNOWN: f64 = 0.1;
 const SETTLED: f64 = 0.01;
 const MOST_SETTLING: usize = 20;
 /// Slopes are good enough where a step gains more than this share of what they promised.
-const KEPT_PROMISE: f64 = 0.5;
+pub const KEPT_PROMISE: f64 = 0.5;
 
 /// Which number of the contact a baseline parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
