@@ -22,6 +22,9 @@ use crate::files::model_file::ModelFile;
 /// are: their subsets stand in the table too.
 const OUT_OF_QUESTION: f64 = 60.0;
 
+/// Sets with a cause that the drive denies that stay in the comparison.
+const DENIED: usize = 3;
+
 /// The contact, searched.
 pub struct ContactPart {
     /// Training logs.
@@ -69,12 +72,25 @@ impl ContactPart {
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
         let mut problem = Problem::new(&logs, &baseline, &terms);
-        let ranked = search::search(&mut problem, progress).ranked;
+        let ranked = search::search(&mut problem, &[], progress).ranked;
         let contributions = contributions(&problem, &ranked);
         let best = of_largest_posterior(&ranked, &contributions);
         let best = problem.change(&best.terms, &best.p);
         let noise = problem.noise.clone();
         (Self { logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }, best)
+    }
+
+    /// Searched again without causes that the drive denies; the best sets that have one stay in the comparison.
+    #[must_use]
+    pub fn without(self, denied: &[&str], progress: &(dyn Fn(&str) + Sync)) -> Self {
+        let mut problem = Problem::new(&self.logs, &self.baseline, &self.terms);
+        let found = search::search(&mut problem, denied, progress).ranked;
+        let with_denied = |fit: &Fit| fit.terms.iter().any(|term| denied.contains(&self.terms[*term].effect));
+        let before = self.ranked.iter().map(|r| &r.fit).filter(|fit| with_denied(fit)).take(DENIED).cloned();
+        let ranked = search::beside(&problem, found, before.collect());
+        let contributions = contributions(&problem, &ranked);
+        let noise = problem.noise.clone();
+        Self { noise, ranked, contributions, ..self }
     }
 
     /// The likelihood of the training logs.
@@ -105,7 +121,7 @@ impl ContactPart {
     }
 
     /// Effects of a candidate.
-    fn effects(&self, place: usize) -> impl Iterator<Item = &'static str> + '_ {
+    pub fn effects(&self, place: usize) -> impl Iterator<Item = &'static str> + '_ {
         self.fit(place).terms.iter().map(|term| self.terms[*term].effect)
     }
 

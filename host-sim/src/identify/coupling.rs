@@ -25,6 +25,8 @@ const DAMPING_RATIO: [f64; 2] = [0.003, 1.5];
 const DISC_SHARE: [f64; 2] = [0.1, 0.9];
 /// From the width of some counts of an encoder to a loose key's.
 const GAP_RAD: [f64; 2] = [1e-4, 0.3];
+/// Play narrower than this share of the twist by the usual torque is none: the spring makes the motion.
+const LEAST_PLAY: f64 = 0.1;
 /// Share of a soft stage: less is play, more is one stage.
 const SOFT_SHARE: [f64; 2] = [0.02, 0.98];
 /// Rounding of play: at 1 it is felt all over the gap.
@@ -168,13 +170,15 @@ impl Coupling {
         }
     }
 
-    /// Whether a coupling may have these numbers.
-    pub fn is_allowed(&self) -> bool {
+    /// Whether a coupling may have these numbers where motor and disc have this inertia together.
+    pub fn is_allowed(&self, inertia: f64, usual_torque: f64) -> bool {
+        let least_play = LEAST_PLAY * usual_torque / self.law(inertia, usual_torque).stiffness;
         let within = |[low, high]: [f64; 2], value: f64| (low..high).contains(&value);
         within(HERTZ, self.mode_hz)
             && within(DAMPING_RATIO, self.damping_ratio)
             && within(DISC_SHARE, self.disc_share)
             && (self.gap_rad == 0.0 || within(GAP_RAD, self.gap_rad))
+            && (!self.is_play() || self.gap_rad >= least_play)
             && (self.soft_share == 0.0 || within(SOFT_SHARE, self.soft_share))
             && within([0.0, if self.is_play() { MOST_ROUNDING } else { MOST_BEND }], self.bend)
     }
@@ -276,8 +280,20 @@ mod tests {
             assert_eq!(told.len(), own.len());
             assert!(told.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-9), "{told:?} {own:?}");
             assert_eq!(coupling.with(&own).fitted(), own);
-            assert!(coupling.is_allowed());
+            assert!(coupling.is_allowed(0.6, USUAL_NM));
         }
+    }
+
+    #[test]
+    fn play_that_a_stiff_torque_does_not_feel_is_none() {
+        // The twist by the usual torque is 0.0338 rad.
+        let of_gap = |gap_rad| Coupling { gap_rad, ..Coupling::spring(10.0, 0.05, 0.5) };
+        let twist = USUAL_NM / of_gap(0.01).law(0.03, USUAL_NM).stiffness;
+        for (share, allowed) in [(0.05, false), (0.2, true)] {
+            assert_eq!(of_gap(share * twist).is_allowed(0.03, USUAL_NM), allowed, "{share}");
+        }
+        // A soft stage is a spring's.
+        assert!(Coupling { soft_share: 0.5, ..of_gap(0.05 * twist) }.is_allowed(0.03, USUAL_NM));
     }
 
     #[test]

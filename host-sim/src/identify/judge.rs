@@ -154,7 +154,7 @@ fn of_contact_logs(
     if normal_load.is_none() {
         notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
     }
-    let (contact, best) = ContactPart::searched(logs, model, drive.as_ref(), progress);
+    let (mut contact, best) = ContactPart::searched(logs, model, drive.as_ref(), progress);
     if let Some(seen) = contact_part::without_normal_end(&contact.logs, &best) {
         normal_load = of_normal_load(&seen);
     }
@@ -164,6 +164,12 @@ fn of_contact_logs(
     }
     if let (Some(drive), Some(logs)) = (&mut drive, drive_logs(seen.as_ref().unwrap_or(&contact.logs))) {
         drive.tell(&logs, &contact);
+        let denied = drive.denied(&contact);
+        if !denied.is_empty() {
+            contact = contact.without(&denied, progress);
+            drive.forget();
+            drive.tell(&logs, &contact);
+        }
     }
     Ok(Found { contact: Some(contact), drive, normal_load, notes })
 }

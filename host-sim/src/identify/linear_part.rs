@@ -9,7 +9,7 @@ use super::effects::{DriveView, LIBRARY, NormalLoadView};
 use super::law_form::LAW_FORM;
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Contribution, Rest};
-use super::table::{Candidate, MOST_CAUSES};
+use super::table::{Candidate, LOG_PRIOR, MOST_CAUSES};
 use super::term::Parameter;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
@@ -54,6 +54,26 @@ impl Linear {
         let mut told: Vec<&'static str> = told.map(|a| a.effect).collect();
         told.sort_unstable();
         told
+    }
+
+    /// Effects of the contact's best set whose errors of the friction channel cost more here than another cause would: the
+    /// motor's torque does not know of them.
+    pub fn denied(&self, contact: &ContactPart) -> Vec<&'static str> {
+        let best = |told: &[&str]| {
+            let own = self.solved.iter().filter(|solved| self.told(solved) == told);
+            own.map(|solved| solved.log_evidence).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let nothing = best(&[]);
+        let tells = |effect: &&'static str| self.alternatives.iter().any(|a| a.told && a.effect == *effect);
+        contact.effects(0).filter(tells).filter(|effect| best(&[*effect]) < nothing + LOG_PRIOR).collect()
+    }
+
+    /// Takes back what the contact has told.
+    pub fn forget(&mut self) {
+        let told: Vec<bool> = self.solved.iter().map(|solved| !self.told(solved).is_empty()).collect();
+        let mut told = told.into_iter();
+        self.solved.retain(|_| !told.next().unwrap_or(false));
+        self.alternatives.retain(|a| !a.told);
     }
 
     /// Adds the sets in which the friction channel is as the contact's sets say that it is. What the channel shows too much is
@@ -186,5 +206,68 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
         unit: "N m",
         drive_scales: None,
         normal_load_scales: Some(scales),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::balance::LogRows;
+    use crate::identify::noise::tests::white;
+
+    const ROWS: usize = 4000;
+
+    /// A drive whose response is the error of a channel times a factor, and noise.
+    fn drive(error_nm: &[f64], factor: f64) -> (Linear, [DriveLog; 1]) {
+        let still = vec![0.0; ROWS];
+        let grid = crate::identify::grid::Grid::new(&(0..ROWS).map(|i| 1e-3 * i as f64).collect::<Vec<_>>());
+        let log = DriveLog::made(
+            String::new(),
+            grid,
+            still.clone(),
+            still.clone(),
+            Some(still.clone()),
+            None,
+            vec![true; ROWS],
+            0.02,
+        );
+        let noise = white(ROWS, 3);
+        let response =
+            log.filtered(error_nm).iter().zip(&noise).map(|(e, n)| -factor * e + 0.01 * n).collect();
+        let rows = LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; ROWS],
+            noise: Box::new(|_| vec![0.01]),
+        };
+        let swing = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
+        let balance = Balance::new(response, vec![(Parameter::amplitude("swing", 1.0), swing)], &[rows], 1.0);
+        let linear = Linear {
+            balance,
+            alternatives: Vec::new(),
+            solved: Vec::new(),
+            coordinates: Vec::new(),
+            unit: "N m",
+            drive_scales: None,
+            normal_load_scales: None,
+        };
+        (linear, [log])
+    }
+
+    #[test]
+    fn an_error_that_is_told_is_as_large_as_it_is_told_or_costs_evidence() {
+        let error_nm: Vec<f64> = (0..ROWS).map(|i| 0.3 * (0.004 * i as f64).cos()).collect();
+        let gain = |factor: f64| {
+            let (mut linear, logs) = drive(&error_nm, factor);
+            linear.alternatives = vec![told("channel", &logs, std::slice::from_ref(&error_nm))];
+            let [none, with] = [&[][..], &[0]].map(|set| linear.balance.solve(&linear.alternatives, set));
+            (with.log_evidence - none.log_evidence, with.p[1])
+        };
+        // The channel shows what the motor does not bear, and so by a tenth less; the motor bears it all.
+        for factor in [1.0, 0.9] {
+            let (gained, off) = gain(factor);
+            assert!(gained > -LOG_PRIOR && (off - (factor - 1.0)).abs() < 0.01, "{factor}: {gained} {off}");
+        }
+        assert!(gain(0.0).0 < LOG_PRIOR, "{}", gain(0.0).0);
     }
 }

@@ -281,7 +281,8 @@ mod tests {
                 candidate(1, &["law"], 500.0, &[]),
                 candidate(2, &[], 0.0, &[]),
             ];
-            let drive = vec![candidate(0, &[], 0.0, &[]), candidate(1, &["channel"], with_error, &["channel"])];
+            let drive =
+                vec![candidate(0, &[], 0.0, &[]), candidate(1, &["channel"], with_error, &["channel"])];
             let best = table(&[(Part::Friction, contact), (Part::Drive, drive)]).0[0].clone();
             (best.effects, best.places[1].1)
         };

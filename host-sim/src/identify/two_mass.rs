@@ -119,7 +119,7 @@ fn alternative(
     pull: f64,
 ) -> Option<Alternative> {
     let n = numbers;
-    if !n.is_allowed() {
+    if !n.is_allowed(view.inertia, view.scales.effort) {
         return None;
     }
     let law = n.law(view.inertia, view.scales.effort);

@@ -228,6 +228,33 @@ mod tests {
     }
 
     #[test]
+    fn what_it_shows_too_much_is_what_is_not_the_torque_when_it_acted() {
+        let torque = |i: f64| 3.0 * (0.01 * i).sin();
+        let (gain, zero) = (|i: f64| 0.1 * (0.003 * i).sin(), |i: f64| 0.5 * (0.005 * i).cos());
+        let change = |late_s| Change {
+            gain: Some(vec![series(gain)]),
+            zero_nm: Some(vec![series(zero)]),
+            late_s,
+            ..Change::default()
+        };
+        for (late, rig_late) in [(0.0, 0.0), (LATE, 0.0), (LATE, 2.0)] {
+            // The rig file knows of a part of the delay.
+            let shown = |i: f64| {
+                let i = i - late - rig_late;
+                torque(i) * (1.0 + gain(i)) + zero(i)
+            };
+            let logs = [ContactLog { friction_late: rig_late, ..log(series(shown)) }];
+            let error = error_nm(&logs, &change(1e-3 * late)).expect("it has one");
+            let expected = series(|i| shown(i + rig_late) - torque(i));
+            assert!(off(&error[0], &expected) < 1e-4, "{late} {rig_late}: {}", off(&error[0], &expected));
+        }
+        assert!(
+            error_nm(&[log(series(torque))], &Change { mode: Some((80.0, 0.1)), ..Change::default() })
+                .is_none()
+        );
+    }
+
+    #[test]
     fn a_zero_that_jumps_does_not_shake_the_mode_there_nor_back() {
         let zero = |i: f64| if i < 1000.0 { 0.0 } else { 0.7 };
         let change = Change {

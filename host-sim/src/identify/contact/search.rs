@@ -117,11 +117,11 @@ pub struct Found {
     pub ranked: Vec<Ranked>,
 }
 
-/// Searches.
-pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Found {
+/// Searches for causes but these.
+pub fn search(problem: &mut Problem<'_>, denied: &[&str], progress: &(dyn Fn(&str) + Sync)) -> Found {
     let base = baseline(problem);
     progress("single causes");
-    let (singles, known) = singles(problem, &base);
+    let (singles, known) = singles(problem, denied, &base);
     let mut all: Vec<Fit> = singles.iter().take(FINALISTS).cloned().collect();
     all.push(base.clone());
     let mut parents: Vec<Fit> = singles.into_iter().take(PARENTS).collect();
@@ -135,7 +135,7 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
             break;
         }
         progress(what);
-        let children = children(problem, &parents, &known);
+        let children = children(problem, denied, &parents, &known);
         parents = children.iter().take(2).cloned().collect();
         all.extend(children.into_iter().take(FINALISTS));
     }
@@ -169,6 +169,12 @@ pub fn search(problem: &mut Problem<'_>, progress: &(dyn Fn(&str) + Sync)) -> Fo
         best.fit = problem.settled(best.fit.clone());
     }
     Found { ranked }
+}
+
+/// Sets that were found with another noise model beside those of this one.
+pub fn beside(problem: &Problem<'_>, ranked: Vec<Ranked>, found: Vec<Fit>) -> Vec<Ranked> {
+    let again = |fit: Fit| problem.fit(&fit.terms, fit.p, SUBSET_ITERATIONS, None);
+    rank(problem, ranked, found.into_par_iter().map(again).collect())
 }
 
 /// How many of the samples that swing count as one to what is fitted.
@@ -240,7 +246,7 @@ fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]
 }
 
 /// The best single terms, and for each nonlinear one the points where it stood after a few iterations.
-fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>) {
+fn singles(problem: &Problem<'_>, denied: &[&str], base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>) {
     let slopes = problem.slopes(&[], &base.p, &base.r);
     let first = |terms: Vec<usize>| -> Vec<Fit> {
         let starts: Vec<(usize, Vec<f64>)> = terms
@@ -252,7 +258,8 @@ fn singles(problem: &Problem<'_>, base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>)
             .map(|(term, start)| problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Some(&slopes)))
             .collect()
     };
-    let forms = (0..problem.terms.len()).filter(|term| !problem.terms[*term].law).collect();
+    let wanted = |term: &usize| !problem.terms[*term].law && !denied.contains(&problem.terms[*term].effect);
+    let forms = (0..problem.terms.len()).filter(wanted).collect();
     let tried = first(forms);
     let mut known: Vec<Option<Points>> = vec![None; problem.terms.len()];
     for fit in &tried {
@@ -314,6 +321,7 @@ fn bent(problem: &Problem<'_>, mut fits: Vec<Fit>) -> Vec<Fit> {
 /// Linearised gain in evidence of each term beside a fit, with the values at which it starts.
 fn table(
     problem: &Problem<'_>,
+    denied: &[&str],
     parent: &Fit,
     slopes: &Slopes,
     known: &[Option<Points>],
@@ -321,7 +329,9 @@ fn table(
 ) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
     let w = problem.weights(&parent.r);
-    let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
+    let has = |effect: &str| {
+        denied.contains(&effect) || parent.terms.iter().any(|t| problem.terms[*t].effect == effect)
+    };
     let others: Vec<usize> = (0..problem.terms.len())
         .filter(|t| !problem.terms[*t].law && !has(problem.terms[*t].effect))
         .collect();
@@ -409,13 +419,13 @@ fn table(
     out
 }
 
-fn children(problem: &Problem<'_>, parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
+fn children(problem: &Problem<'_>, denied: &[&str], parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
     let slopes: Vec<Slopes> =
         parents.iter().map(|parent| problem.slopes(&parent.terms, &parent.p, &parent.r)).collect();
     let mut candidates: Vec<(f64, Vec<usize>, (&Slopes, Points))> = Vec::new();
     for (place, (parent, slopes)) in parents.iter().zip(&slopes).enumerate() {
         let [level, _] = problem.log_evidence(parent);
-        for (gain, term, starts) in table(problem, parent, slopes, known, place == 0) {
+        for (gain, term, starts) in table(problem, denied, parent, slopes, known, place == 0) {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
             let starts = starts.into_iter().map(|s| [parent.p.as_slice(), &s].concat()).collect();
             candidates.push((level + gain, terms, (slopes, starts)));
