@@ -1,8 +1,9 @@
 //! From clean samples to what a log holds: noise, converters, encoder counts.
 //!
-//! Noise is white and normal, per sample, with a size drawn per case around that of good bridges and
-//! drives; converters have 16 bits, encoders 480 000 counts a turn. Order: amplifier (it may clip), noise,
-//! converter (so may it).
+//! Noise is normal, per sample, with a size drawn per case around that of good bridges and drives; the bridges' has a
+//! part that falls with frequency (a strain gauge's amplifier flickers), and they show a little where nothing pulls.
+//! Converters have 16 bits, encoders 480 000 counts a turn. Order: amplifier (it may clip), noise, converter (so may
+//! it). A drive reports its speed as it turns, or as the way of the counts over the last samples, half of them late.
 
 use std::fmt::Write as _;
 
@@ -17,7 +18,12 @@ const OVERDRIVE: f64 = 0.2;
 /// Counts per radian of both encoders.
 const COUNTS_PER_RAD: f64 = 480_000.0 / std::f64::consts::TAU;
 
-/// Standard deviations.
+/// Time constants of what flickers, s: parts of equal size a decade apart have a power that falls with frequency.
+const FLICKER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
+/// Most samples over which a drive takes its speed.
+const MOST_SAMPLES: usize = 4;
+
+/// Standard deviations, and what else is between a sample and its log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Noise {
     /// Friction torque.
@@ -34,12 +40,25 @@ pub struct Noise {
     pub angle_counts: f64,
     /// Surface temperature.
     pub temperature_k: f64,
+    /// What flickers in the bridges beside their white noise, over that.
+    pub flicker_share: f64,
+    /// What the friction bridge shows where nothing pulls.
+    pub friction_zero_nm: f64,
+    /// What the normal bridge shows where nothing presses.
+    pub normal_zero_n: f64,
+    /// Samples over which the drive takes its speed from its counts; 0 where it knows it.
+    pub speed_samples: usize,
 }
 
 impl Noise {
     /// Draws the sensors of a case.
     #[must_use]
     pub fn draw(seed: u64, factor: f64) -> Self {
+        let mut sensors = Stream::new(seed, "bridges and speed");
+        let (friction_zero, normal_zero) = (sensors.uniform(-0.012, 0.012), sensors.uniform(-0.24, 0.24));
+        let flicker_share = sensors.uniform(0.2, 0.7);
+        let reports = sensors.chance(0.5) && factor > 0.0;
+        let speed_samples = if reports { 1 + sensors.below(MOST_SAMPLES) } else { 0 };
         let mut s = Stream::new(seed, "noise");
         let mut about = |value: f64| factor * s.about(value, 0.3);
         Self {
@@ -50,6 +69,10 @@ impl Noise {
             speed_rad_s: about(0.004),
             angle_counts: about(0.3),
             temperature_k: about(0.3),
+            flicker_share,
+            friction_zero_nm: factor * friction_zero,
+            normal_zero_n: factor * normal_zero,
+            speed_samples,
         }
     }
 }
@@ -156,6 +179,27 @@ fn counted(angle: f64) -> f64 {
     (angle * COUNTS_PER_RAD).round() / COUNTS_PER_RAD
 }
 
+/// What flickers with a deviation of 1: first-order processes, each as large as the others.
+struct Flicker {
+    states: [f64; FLICKER_S.len()],
+    last_s: f64,
+}
+
+impl Flicker {
+    fn new(s: &mut Stream) -> Self {
+        Self { states: FLICKER_S.map(|_| s.normal()), last_s: 0.0 }
+    }
+
+    fn at(&mut self, time_s: f64, s: &mut Stream) -> f64 {
+        let elapsed = time_s - std::mem::replace(&mut self.last_s, time_s);
+        for (state, constant_s) in self.states.iter_mut().zip(FLICKER_S) {
+            let kept = (-elapsed / constant_s).exp();
+            *state = kept * *state + (1.0 - kept * kept).sqrt() * s.normal();
+        }
+        self.states.iter().sum::<f64>() / (FLICKER_S.len() as f64).sqrt()
+    }
+}
+
 /// Writes a contact log as CSV.
 #[must_use]
 pub fn contact_csv(
@@ -172,25 +216,44 @@ pub fn contact_csv(
          m2_speed_rad_s,normal_force_n,friction_torque_nm",
     );
     text.push_str(if temperature { ",surface_temperature_c\n" } else { "\n" });
+    let mut flicker = [Flicker::new(s), Flicker::new(s)];
+    // The first sample's counts, as long as there are none before.
+    let mut counts = std::collections::VecDeque::new();
     for sample in samples {
+        let [in_friction, in_normal] =
+            flicker.each_mut().map(|f| noise.flicker_share * f.at(sample.time_s, s));
         let (mut friction, mut normal) = (sample.friction_torque_nm, sample.normal_force_n);
         if let Some(clip) = &mut clip {
             (friction, normal) = clip.amplifier(sample);
         }
-        friction += noise.friction_nm * s.normal();
-        normal += noise.normal_n * s.normal();
+        friction += noise.friction_zero_nm + noise.friction_nm * (s.normal() + in_friction);
+        normal += noise.normal_zero_n + noise.normal_n * (s.normal() + in_normal);
         if let Some(clip) = &clip {
             (friction, normal) = clip.converter(friction, normal);
         }
         let jitter = noise.angle_counts / COUNTS_PER_RAD;
+        let m1_angle = counted(sample.m1_angle_rad + jitter * s.normal());
+        let m2_angle = counted(sample.m2_angle_rad + jitter * s.normal());
+        counts.push_back((sample.time_s, m2_angle));
+        if counts.len() > noise.speed_samples + 1 {
+            counts.pop_front();
+        }
+        let (since_s, from) = counts[0];
+        let speed = if noise.speed_samples == 0 {
+            sample.m2_speed_rad_s + noise.speed_rad_s * s.normal()
+        } else if sample.time_s > since_s {
+            (m2_angle - from) / (sample.time_s - since_s)
+        } else {
+            0.0
+        };
         let row = [
             sample.m1_torque_ref_nm,
             converted(sample.m1_torque_nm + noise.m1_torque_nm * s.normal(), 20.0),
-            counted(sample.m1_angle_rad + jitter * s.normal()),
+            m1_angle,
             sample.m2_torque_ref_nm,
             converted(sample.m2_torque_nm + noise.m2_torque_nm * s.normal(), 20.0),
-            counted(sample.m2_angle_rad + jitter * s.normal()),
-            sample.m2_speed_rad_s + noise.speed_rad_s * s.normal(),
+            m2_angle,
+            speed,
             converted(normal, 240.0),
             converted(friction, 24.0),
         ];
