@@ -14,6 +14,7 @@ use super::table::{Candidate, Hypothesis, Part, TooSmall, table};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
+use crate::files::speed_lag::Lag;
 use crate::input_error::InputError;
 
 /// Hypotheses below this probability say nothing of what is unknown.
@@ -141,7 +142,7 @@ fn of_contact_logs(
         let logs: Option<Vec<NormalLoadLog>> = logs.iter().map(NormalLoadLog::new).collect();
         Some(linear_part::search_normal_load(&logs?, rig))
     };
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = train.iter().filter_map(speed_note).collect();
     progress("drive");
     let mut drive = of_drive(&logs);
     if drive.is_none() {
@@ -172,6 +173,18 @@ fn of_contact_logs(
         }
     }
     Ok(Found { contact: Some(contact), drive, normal_load, notes })
+}
+
+/// What is said of a log whose speed is not used.
+fn speed_note(log: &Log) -> Option<String> {
+    let Lag { lag_s, std_s } = log.speed_lag()?;
+    Some(format!(
+        "{}: m2_speed_rad_s is {:.2} ± {:.2} ms {} m2_angle_rad; the slope of the angle is used in its place",
+        log.source,
+        1e3 * lag_s.abs(),
+        1e3 * std_s,
+        if lag_s > 0.0 { "behind" } else { "ahead of" }
+    ))
 }
 
 /// A drive alone, of which nothing is known beforehand.
