@@ -105,8 +105,9 @@ pub fn summarise(experiment: &ExperimentFile, log: &Log, run: RunFacts) -> Resul
             }
             Course::Constant { .. } if segment.start_s > 0.0 => {
                 let span = (segment.start_s, to_s);
-                summary.damping_ratio =
-                    decay::damping_ratio(signals.time_s, &angle, &signals.m2_speed_rad_s, span);
+                // Where a swing turns, a speed that is a little late has less noise than the slope of the angle.
+                let speed = log.signal(Signal::M2Speed).unwrap_or(&signals.m2_speed_rad_s);
+                summary.damping_ratio = decay::damping_ratio(signals.time_s, &angle, speed, span);
             }
             _ => {}
         }
