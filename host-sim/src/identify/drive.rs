@@ -7,13 +7,12 @@
 
 use super::balance::{Balance, LogRows};
 use super::contact::log::ContactLog;
-use super::contact::log::unwrapped;
 use super::effects::coordinates::TIME;
 use super::filters::{gaussian, largest_change, rms, steps, white_share};
 use super::grid::Grid;
 use super::noise;
 use super::term::Parameter;
-use crate::files::log::{Log, LogKind};
+use crate::files::log::{Log, LogKind, unwrapped};
 use crate::input_error::InputError;
 
 /// Widths of the filter that are tried, samples.

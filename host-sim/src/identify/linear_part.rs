@@ -218,7 +218,7 @@ mod tests {
     const ROWS: usize = 4000;
 
     /// A drive whose response is the error of a channel times a factor, and noise.
-    fn drive(error_nm: &[f64], factor: f64) -> (Linear, [DriveLog; 1]) {
+    fn drive(error_nm: &[f64], factor: f64) -> (Balance, [DriveLog; 1]) {
         let still = vec![0.0; ROWS];
         let grid = crate::identify::grid::Grid::new(&(0..ROWS).map(|i| 1e-3 * i as f64).collect::<Vec<_>>());
         let log = DriveLog::made(
@@ -242,25 +242,16 @@ mod tests {
         };
         let swing = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
         let balance = Balance::new(response, vec![(Parameter::amplitude("swing", 1.0), swing)], &[rows], 1.0);
-        let linear = Linear {
-            balance,
-            alternatives: Vec::new(),
-            solved: Vec::new(),
-            coordinates: Vec::new(),
-            unit: "N m",
-            drive_scales: None,
-            normal_load_scales: None,
-        };
-        (linear, [log])
+        (balance, [log])
     }
 
     #[test]
     fn an_error_that_is_told_is_as_large_as_it_is_told_or_costs_evidence() {
         let error_nm: Vec<f64> = (0..ROWS).map(|i| 0.3 * (0.004 * i as f64).cos()).collect();
         let gain = |factor: f64| {
-            let (mut linear, logs) = drive(&error_nm, factor);
-            linear.alternatives = vec![told("channel", &logs, std::slice::from_ref(&error_nm))];
-            let [none, with] = [&[][..], &[0]].map(|set| linear.balance.solve(&linear.alternatives, set));
+            let (balance, logs) = drive(&error_nm, factor);
+            let form = told("channel", &logs, std::slice::from_ref(&error_nm));
+            let [none, with] = [&[][..], &[&form]].map(|forms| balance.solve_forms(forms));
             (with.log_evidence - none.log_evidence, with.p[1])
         };
         // The channel shows what the motor does not bear, and so by a tenth less; the motor bears it all.

@@ -324,8 +324,9 @@ fn follows(
     out
 }
 
-/// What an alternative does in a linear balance: its size, relative to the efforts that it balances, from the residuals with and without it. Its
-/// columns do not take each other's shape as laws of friction do; that it is no small part of what is left is enough.
+/// What an alternative does in a linear balance: its size, relative to the efforts that it balances, from the residuals with
+/// and without it. Its columns do not take each other's shape as laws of friction do; that it is no small part of what is
+/// left is enough.
 pub fn contribution(balance: &Balance, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
     let noise = Noise::white(balance.first_deviation.clone());
@@ -361,6 +362,7 @@ pub fn of_balance(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::balance::LogRows;
 
     #[test]
     fn what_repeats_itself_stays_in_a_mean_and_what_is_new_does_not() {
@@ -386,7 +388,7 @@ mod tests {
     #[test]
     fn a_cause_is_as_large_as_it_is_to_the_torques_of_whose_difference_it_is_a_part() {
         const ROWS: usize = 2000;
-        let log = super::super::balance::LogRows {
+        let log = LogRows {
             width: 1.0,
             step_s: 1e-3,
             left_out: vec![false; ROWS],

@@ -128,9 +128,6 @@ fn sorted(mut names: Vec<&'static str>) -> Vec<&'static str> {
 /// hears of is so there.
 fn within<'c>(parts: &'c [(Part, Vec<Candidate>)], effects: &[&str]) -> Option<Vec<(Part, &'c Candidate)>> {
     let allowed = |c: &&Candidate| c.effects.iter().all(|e| effects.contains(e));
-    let best_of = |c: &mut dyn Iterator<Item = &'c Candidate>| {
-        c.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
-    };
     let ((first, own), others) = parts.split_first()?;
     let mut best: Option<(f64, Vec<(Part, &Candidate)>)> = None;
     for candidate in own.iter().filter(allowed) {
@@ -138,10 +135,9 @@ fn within<'c>(parts: &'c [(Part, Vec<Candidate>)], effects: &[&str]) -> Option<V
         for (part, candidates) in others {
             let tells = |effect: &&str| candidates.iter().any(|c| c.told.contains(effect));
             let told: Vec<&str> = candidate.effects.iter().copied().filter(tells).collect();
-            chosen.extend(
-                best_of(&mut candidates.iter().filter(allowed).filter(|c| c.told == told))
-                    .map(|c| (*part, c)),
-            );
+            let heard = candidates.iter().filter(allowed).filter(|c| c.told == told);
+            let best = heard.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
+            chosen.extend(best.map(|c| (*part, c)));
         }
         let log_evidence = chosen.iter().map(|(_, c)| c.log_evidence).sum();
         if chosen.len() == parts.len() && best.as_ref().is_none_or(|(least, _)| log_evidence > *least) {

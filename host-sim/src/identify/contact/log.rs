@@ -1,7 +1,7 @@
 //! A contact log made ready for the observer of the slip.
 
 use super::ringing::Ringing;
-use crate::files::log::Log;
+use crate::files::log::{Log, unwrapped};
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::identify::filters::{gaussian, gradient, local_maximum, rms, shifted, smoothed_flat};
@@ -235,19 +235,4 @@ fn steady_smoothed(values: &[f64], noise: f64) -> Vec<f64> {
             weight * narrow[i] + (1.0 - weight) * wide[i]
         })
         .collect()
-}
-
-/// Takes out jumps by a revolution.
-pub fn unwrapped(angle_rad: &[f64]) -> Vec<f64> {
-    use std::f64::consts::{PI, TAU};
-    let (mut turns, mut last) = (0.0, angle_rad.first().copied().unwrap_or(0.0));
-    let unwrap = |angle: &f64| {
-        let jump = angle - last;
-        last = *angle;
-        if jump.abs() > PI {
-            turns -= (jump / TAU).round();
-        }
-        angle + turns * TAU
-    };
-    angle_rad.iter().map(unwrap).collect()
 }
