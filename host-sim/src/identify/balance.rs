@@ -102,6 +102,8 @@ pub struct Balance {
     pub response: Vec<f64>,
     /// Base parameters and columns.
     pub base: Vec<(Parameter, Vec<f64>)>,
+    /// Where the errors of the sensors begin among them: they stand last.
+    pub sensors: usize,
     /// Deviation of each row, as refitted.
     pub deviation: Vec<f64>,
     /// Deviation of each row before it was refitted: from named sources alone.
@@ -110,6 +112,8 @@ pub struct Balance {
     pub used: Vec<usize>,
     /// Usual size of the torques whose sum the response is: what errors of form are relative to.
     pub scale: f64,
+    /// Deviation of the zero of the bridge in it, in the response's unit; 0 where there is none.
+    pub bridge_zero: f64,
     /// Rows that count as one.
     pub temper: f64,
     /// Distance of the used rows, s.
@@ -139,6 +143,8 @@ const CLEAR_WIDTHS: f64 = 2.0;
 /// evidence by half of it: nothing depends on less.
 const MOST_ITERATIONS: usize = 10;
 const CONVERGED: f64 = 1e-3;
+/// What is held moves by no more than this share of its prior's deviation: no signal tells it so well.
+const HELD: f64 = 1e-4;
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 
@@ -211,21 +217,44 @@ impl Balance {
         let first_deviation = deviation.clone();
         Self {
             response,
+            sensors: base.len(),
             base,
             deviation,
             first_deviation,
             used,
             scale,
+            bridge_zero: 0.0,
             temper: FIRST_TEMPER,
             row_step_s,
             starts,
         }
     }
 
+    /// With the base's parameters from this place on as errors of the sensors, and the deviation of its bridge's zero.
+    #[must_use]
+    pub fn with_sensors(self, sensors: usize, bridge_zero: f64) -> Self {
+        Self { sensors, bridge_zero, ..self }
+    }
+
     /// Solves a set of alternatives.
     pub fn solve(&self, alternatives: &[Alternative], set: &[usize]) -> Solved {
         let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
         Solved { set: set.to_vec(), ..self.solve_forms(&chosen) }
+    }
+
+    /// What a set leaves where the errors of the sensors are those of another solution.
+    pub fn left_with_sensors_of(
+        &self,
+        held: &Solved,
+        alternatives: &[Alternative],
+        set: &[usize],
+    ) -> Vec<f64> {
+        let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
+        let parameters = self.base.iter().map(|b| b.0.clone()).enumerate();
+        let hold = |(at, q): (usize, Parameter)| {
+            if at < self.sensors { q } else { Parameter { mean: held.p[at], sd: HELD * q.sd, ..q } }
+        };
+        self.solved(parameters.map(hold).collect(), &chosen, None).residual
     }
 
     /// Solves these forms; the set of what it gives is empty.
@@ -235,9 +264,18 @@ impl Balance {
 
     /// The same from the weights of a solution that is near.
     pub fn solve_near(&self, chosen: &[&Alternative], near: Option<&Solved>) -> Solved {
+        self.solved(self.base.iter().map(|b| b.0.clone()).collect(), chosen, near)
+    }
+
+    /// The same with these priors of the base.
+    fn solved(
+        &self,
+        mut parameters: Vec<Parameter>,
+        chosen: &[&Alternative],
+        near: Option<&Solved>,
+    ) -> Solved {
         let mut response = self.response.clone();
         let base = self.base.iter().map(|b| &b.1);
-        let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
         let mut log_prior = 0.0;
         for alternative in chosen {
             if let Some(added) = &alternative.response {
@@ -527,6 +565,24 @@ mod tests {
         let solved = balance.solve(&[], &[]);
         balance.refit_noise(&solved);
         assert!((balance.deviation[ROWS / 2] - 3.0).abs() < 0.2, "{}", balance.deviation[ROWS / 2]);
+    }
+
+    #[test]
+    fn a_cause_with_the_shape_of_a_sensors_error_has_its_whole_size() {
+        // An offset of the motor beside a bridge whose zero is known to a tenth of it.
+        let swing = balance(white(ROWS, 2).iter().map(|n| 1.0 + n).collect());
+        let zero = (Parameter { amplitude: false, ..Parameter::amplitude("zero", 0.1) }, vec![1.0; ROWS]);
+        let base = swing.base.iter().cloned().chain([zero]).collect();
+        let balance = Balance { base, ..swing }.with_sensors(1, 0.1);
+        let column = vec![vec![1.0; ROWS]];
+        let forms = [Alternative::columns("offset", vec![Parameter::amplitude("size", 10.0)], column)];
+        let [with, without] = [&[0][..], &[]].map(|set| balance.solve(&forms, set));
+        assert!(with.log_evidence > without.log_evidence + 10.0);
+        assert!((with.p[2] - 1.0).abs() < 0.1, "{:?}", with.p);
+        // Rows are so many that the zero takes nearly all of it without the cause.
+        assert!(balance.difference(&with.residual, &without.residual) < 0.2);
+        let held = balance.left_with_sensors_of(&with, &forms, &[]);
+        assert!((balance.difference(&with.residual, &held) - with.p[2]).abs() < 0.01);
     }
 
     #[test]

@@ -7,7 +7,6 @@ use super::contact::baseline;
 use super::contact::change::{Change, ContactTerm};
 use super::contact::channel::{before_ringing, error_nm};
 use super::contact::log::ContactLog;
-use super::contact::noise::MODEL_FORM;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search;
 use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales, TIME};
@@ -17,6 +16,7 @@ use super::linear_part::Linear;
 use super::rest::{Contribution, Ground};
 use super::table::{Candidate, LOG_PRIOR};
 use crate::files::model_file::ModelFile;
+use crate::files::rig_file::RigFile;
 
 /// A set with so much less ln evidence than the best one is not the answer, e^−60 of it, however small the best one's causes
 /// are: their subsets stand in the table too.
@@ -62,12 +62,12 @@ impl ContactPart {
     /// Searches the training logs, with what the drive says of the disc's motion; beside it what the best set changes.
     pub fn searched(
         logs: Vec<ContactLog>,
-        model: &ModelFile,
+        (model, rig): (&ModelFile, &RigFile),
         drive: Option<&Linear>,
         progress: &(dyn Fn(&str) + Sync),
     ) -> (Self, Change) {
         let block = baseline::has_block(model);
-        let baseline = baseline::baseline(model, baseline::KNOWN_WITHIN);
+        let baseline = baseline::baseline(model, baseline::KNOWN_WITHIN).with_bridge_zeros(rig);
         let (logs, disc_cause) = with_disc_motion(logs, &baseline, drive);
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
@@ -237,8 +237,7 @@ fn with_disc_motion(
 /// where more says so than that nothing is lost by one.
 fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], contributions: &[Vec<Contribution>]) -> &'r Fit {
     let posterior = |r: &search::Ranked| r.log_evidence + LOG_PRIOR * r.fit.terms.len() as f64;
-    let large = |own: &Contribution| own.size > MODEL_FORM;
-    let told = ranked.iter().zip(contributions).filter(|(_, all)| all.iter().all(large));
+    let told = ranked.iter().zip(contributions).filter(|(_, all)| all.iter().all(Contribution::is_told));
     let best = told.map(|(r, _)| r).max_by(|a, b| posterior(a).total_cmp(&posterior(b)));
     &best.unwrap_or(&ranked[0]).fit
 }

@@ -41,6 +41,8 @@ const GAIN: f64 = 5e-3;
 pub const INERTIA: usize = 0;
 /// Place of the Coulomb torque.
 pub const COULOMB: usize = 1;
+/// Where the errors of the channels begin.
+const SENSORS: usize = 3;
 
 /// Signals of a drive.
 #[derive(Debug, Clone)]
@@ -257,6 +259,8 @@ pub struct DrivePrior {
     pub coulomb: Option<f64>,
     /// Viscous friction.
     pub viscous: Option<f64>,
+    /// Deviation of what the friction bridge shows where nothing pulls.
+    pub bridge_zero: Option<f64>,
 }
 
 /// The balance of these logs. `friction` replaces what the logs have, where a sensor fault is taken off.
@@ -312,8 +316,12 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         base.push((wide("friction_late_s", 0.0, BRIDGE_LATE_S), concat(&|log| rate(log, &friction(log)))));
         base.push((wide("friction_gain", 0.0, GAIN), concat(&|log| log.filtered(&friction(log)))));
     }
+    if let Some(deviation) = prior.bridge_zero {
+        base.push((wide("friction_zero", 0.0, deviation), concat(&|log| vec![-1.0; log.len()])));
+    }
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, contact, scales)).collect();
     Balance::new(concat(&response), base, &rows, scales.effort)
+        .with_sensors(SENSORS, prior.bridge_zero.unwrap_or(0.0))
 }
 
 /// Rows of a log: noise from named sources; near standstill the bearing's friction is a reaction.

@@ -95,7 +95,7 @@ pub fn baseline_of(model: &ModelFile, free: &[String]) -> Result<Baseline, Input
             Role::A2 => numbers.a2_s_per_m,
             Role::Stiffness => numbers.stiffness_n_per_m,
             Role::Damping => numbers.damping_n_s_per_m,
-            Role::Factor | Role::Late => 1.0,
+            Role::Factor | Role::Late | Role::FrictionZero | Role::NormalZero => 1.0,
         };
         let parameter =
             Parameter { step: 0.01, reach: 0.5, ..Parameter::logarithm(name.as_str(), value, sd) };

@@ -155,7 +155,7 @@ fn of_contact_logs(
     if normal_load.is_none() {
         notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
     }
-    let (mut contact, best) = ContactPart::searched(logs, model, drive.as_ref(), progress);
+    let (mut contact, best) = ContactPart::searched(logs, (model, rig), drive.as_ref(), progress);
     if let Some(seen) = contact_part::without_normal_end(&contact.logs, &best) {
         normal_load = of_normal_load(&seen);
     }

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::balance::{self, Alternative, Balance, Company, Solved};
+use super::bridge_zero;
 use super::contact_part::ContactPart;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::{DriveView, LIBRARY, NormalLoadView};
@@ -98,12 +99,13 @@ impl Linear {
         self.solved.extend(solved);
     }
 
-    /// What each alternative of a set does, the others fitted again without it.
+    /// What each alternative of a set does, the others fitted again without it. What is known of the sensors stays as it is: a
+    /// large cause that has the shape of their errors would be taken for one, at odds that the data do not hear.
     fn contributions(&self, solved: &Solved) -> Vec<Contribution> {
         let own = |a: &usize| {
             let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
-            let without = self.balance.solve(&self.alternatives, &set);
-            rest::contribution(&self.balance, &solved.residual, &without.residual)
+            let without = self.balance.left_with_sensors_of(solved, &self.alternatives, &set);
+            rest::contribution(&self.balance, self.alternatives[*a].effect, &solved.residual, &without)
         };
         solved.set.iter().map(own).collect()
     }
@@ -186,6 +188,7 @@ pub fn drive_prior(rig: &RigFile) -> DrivePrior {
         inertia: Some(rig.m2_inertia_kg_m2),
         coulomb: Some(rig.bearing_coulomb_nm),
         viscous: Some(rig.bearing_viscous_nm_s_per_rad),
+        bridge_zero: Some(bridge_zero::standard_deviations(rig)[0]),
     }
 }
 

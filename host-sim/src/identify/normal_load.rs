@@ -6,6 +6,7 @@
 //! Rows where the elements are lifted off are left out.
 
 use super::balance::{Balance, LogRows};
+use super::bridge_zero;
 use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
 use super::filters::{
@@ -27,6 +28,9 @@ const BEND: f64 = 0.6;
 const TOUCHING: f64 = 0.04;
 /// Gain and preload of the rig file are known within 10 %, the mode's coefficients within half.
 const KNOWN: f64 = 0.1;
+
+/// Place of the torque's lateness among the base's parameters.
+const LATENESS: usize = 4;
 
 /// Signals of the normal-load actuator in a log.
 #[derive(Debug, Clone)]
@@ -178,7 +182,9 @@ pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales)
         ),
     ];
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, gain, scales)).collect();
+    let zero_nm = bridge_zero::standard_deviations(rig)[1] / gain;
     Balance::new(concat(&|log| log.filtered(&log.torque_nm)), base, &rows, scales.torque_nm)
+        .with_sensors(LATENESS, zero_nm)
 }
 
 /// Rows of a log: noise from named sources; lifted off, the stop carries what the springs do not.

@@ -4,9 +4,10 @@ use super::balance::Balance;
 use super::contact::channel::before_ringing;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
-use super::contact::problem::{Fit, Problem};
+use super::contact::problem::{Fit, Problem, Role};
 use super::contact::search;
 use super::contact_part::{ContactPart, DiscCause};
+use super::effects;
 use super::filters::rms;
 use super::table::LOG_PRIOR;
 
@@ -66,26 +67,33 @@ pub struct Contribution {
     /// How clearly it stands out of what the whole set leaves: from 1 on it does. In the contact the amplitude of the structured
     /// rest that it explains over that which is left, in a linear balance its change of the prediction over half of that.
     pub over_rest: f64,
+    /// What sizes like it are known to, relative to the signal: the form of a model, or the class of a bridge.
+    pub known: f64,
 }
 
 impl Contribution {
     /// In the contact, from the size and the structured rests with and without it.
-    fn new(size: f64, with: f64, without: f64) -> Self {
+    fn new(size: f64, with: f64, without: f64, known: f64) -> Self {
         // Where nothing is structured without it either, its size alone is what is known of it.
         let over_rest = if without > 0.0 {
             (without * without - with * with).max(0.0).sqrt() / with
         } else {
             f64::INFINITY
         };
-        Self { size, over_rest }
+        Self { size, over_rest, known }
     }
 
-    /// Its size over what could be the form of the model, or of a larger cause beside it that is wrong by `beside`. One that
+    /// Whether it is larger than what sizes like it are known to.
+    pub fn is_told(&self) -> bool {
+        self.size > self.known
+    }
+
+    /// Its size over what could be the form of the model or the class of a bridge, or the form of a larger cause beside it that is wrong by `beside`. One that
     /// leaves more than it explains has the wrong shape, and is so much more likely a form; up to where nothing is. One that
     /// explains all that the larger cause leaves has a shape of its own, and is so much less likely that cause's form.
     pub fn over_form(&self, beside: f64) -> f64 {
         let leaves = self.over_rest.recip();
-        let of_model = MODEL_FORM * leaves.clamp(1.0, BEYOND_FORM);
+        let of_model = self.known * leaves.clamp(1.0, BEYOND_FORM);
         let of_other = beside * leaves.clamp(BEYOND_FORM.recip(), BEYOND_FORM);
         self.size / of_model.max(of_other)
     }
@@ -151,6 +159,14 @@ pub struct Ground {
     blocks: [usize; 2],
     /// RMS of the channel, N m.
     signal: f64,
+    /// Deviation of the bridge's zero, N m.
+    class_nm: f64,
+}
+
+/// What the sizes of an effect are known to, relative to a signal in which a bridge's zero has this deviation.
+fn known(effect: &str, class: f64) -> f64 {
+    let of_bridge = effects::with_id(effect).is_some_and(|effect| effect.is_like_a_bridges_error());
+    if of_bridge { class.max(MODEL_FORM) } else { MODEL_FORM }
 }
 
 impl Ground {
@@ -173,6 +189,7 @@ impl Ground {
             noise: Noise { repeated: if dense { repeated.collect() } else { Vec::new() }, white },
             signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
             blocks: blocks(step_s),
+            class_nm: problem.baseline.deviation_of(Role::FrictionZero),
             deviation,
         }
     }
@@ -197,12 +214,15 @@ impl Ground {
     /// What each cause of a fit does, from the fits without it. What is named of a block stays in both rests: where a transition
     /// is uncertain a wrong shape shows all the same.
     pub fn contributions(&self, problem: &Problem<'_>, fit: &Fit, without: &[Fit]) -> Vec<Contribution> {
+        let known =
+            fit.terms.iter().map(|term| known(problem.terms[*term].effect, self.class_nm / self.signal));
         let white = Noise::white(self.noise.white.clone());
         let rest = |fit: &Fit| self.beyond(&white, &self.left(problem, fit)).0.sqrt();
         let with = rest(fit);
-        let own =
-            |left: &Fit| Contribution::new(search::difference(problem, &fit.r, &left.r), with, rest(left));
-        without.iter().map(own).collect()
+        let own = |(left, known): (&Fit, f64)| {
+            Contribution::new(search::difference(problem, &fit.r, &left.r), with, rest(left), known)
+        };
+        without.iter().zip(known).map(own).collect()
     }
 
     /// What a fit leaves, N m; before the sensor's mode, where it rings: what strikes it between two samples is not known
@@ -327,12 +347,17 @@ fn follows(
 /// What an alternative does in a linear balance: its size, relative to the efforts that it balances, from the residuals with
 /// and without it. Its columns do not take each other's shape as laws of friction do; that it is no small part of what is
 /// left is enough.
-pub fn contribution(balance: &Balance, residual: &[f64], without: &[f64]) -> Contribution {
+pub fn contribution(balance: &Balance, effect: &str, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
     let noise = Noise::white(balance.first_deviation.clone());
     let left = structured(residual, &noise, &balance.used, block).0.sqrt();
     let change = balance.difference(residual, without);
-    Contribution { size: change / balance.scale.max(1e-12), over_rest: change / (LEFT_SHARE * left) }
+    let scale = balance.scale.max(1e-12);
+    Contribution {
+        size: change / scale,
+        over_rest: change / (LEFT_SHARE * left),
+        known: known(effect, balance.bridge_zero / scale),
+    }
 }
 
 /// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set
@@ -377,7 +402,7 @@ mod tests {
 
     #[test]
     fn what_a_cause_explains_is_weighed_against_what_it_leaves() {
-        let over = |with, without| Contribution::new(0.02, with, without).over_rest;
+        let over = |with, without| Contribution::new(0.02, with, without, MODEL_FORM).over_rest;
         assert!((over(3.0, 5.0) - 4.0 / 3.0).abs() < 1e-12);
         // It leaves more than was left without it.
         assert_eq!(over(5.0, 3.0), 0.0);
@@ -396,8 +421,27 @@ mod tests {
         };
         // The difference of two torques of 4 N m, which is nothing but an offset of 0.01 N m.
         let balance = Balance::new(vec![0.01; ROWS], Vec::new(), &[log], 4.0);
-        let size = contribution(&balance, &[0.0; ROWS], &[0.01; ROWS]).size;
+        let size = contribution(&balance, "", &[0.0; ROWS], &[0.01; ROWS]).size;
         assert!((size - 0.0025).abs() < 1e-12 && size < MODEL_FORM, "{size}");
+    }
+
+    #[test]
+    fn an_error_of_a_bridge_is_told_where_it_is_beyond_its_class() {
+        const ROWS: usize = 2000;
+        let log = LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; ROWS],
+            noise: Box::new(|_| vec![0.01]),
+        };
+        // Torques of 2 N m beside a bridge of 8 N m whose zero is known to 0.016.
+        let balance = Balance::new(vec![0.0; ROWS], Vec::new(), &[log], 2.0).with_sensors(0, 0.016);
+        let told = |effect: &str, size_nm: f64| {
+            contribution(&balance, effect, &[0.0; ROWS], &[size_nm; ROWS]).is_told()
+        };
+        assert_eq!([0.012, 0.020].map(|size_nm| told("bridge_drift", size_nm)), [false, true]);
+        // What has another shape is known as well as a model is.
+        assert_eq!([0.006, 0.012].map(|size_nm| told("m2_ripple", size_nm)), [false, true]);
     }
 
     #[test]

@@ -230,6 +230,7 @@ fn hand_down(all: &mut [Hypothesis]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::contact::noise::MODEL_FORM;
     use crate::identify::law_form::LAW_FORM;
 
     #[test]
@@ -240,8 +241,10 @@ mod tests {
                 effects: effects.to_vec(),
                 log_evidence,
                 place,
-                contributions: [Contribution { size: 0.1, over_rest: 9.0 }, Contribution { size, over_rest }]
-                    [..effects.len()]
+                contributions: [
+                    Contribution { size: 0.1, over_rest: 9.0, known: MODEL_FORM },
+                    Contribution { size, over_rest, known: MODEL_FORM },
+                ][..effects.len()]
                     .to_vec(),
                 forms: vec![LAW_FORM; effects.len()],
                 told: Vec::new(),
@@ -267,7 +270,7 @@ mod tests {
     fn what_the_contact_says_of_its_channel_is_so_in_the_drive() {
         // Two causes explain the contact as well as each other; one of them is an error of its channel.
         let candidate = |place, effects: &[&'static str], log_evidence: f64, told: &[&'static str]| {
-            let large = Contribution { size: 0.1, over_rest: 9.0 };
+            let large = Contribution { size: 0.1, over_rest: 9.0, known: MODEL_FORM };
             let named = effects.iter().map(|effect| (*effect, LAW_FORM, large));
             Candidate { told: told.to_vec(), ..Candidate::new(place, log_evidence, named) }
         };

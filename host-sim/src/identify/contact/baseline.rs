@@ -2,6 +2,8 @@
 
 use super::problem::{BaseParameter, Baseline, Numbers, Role};
 use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::rig_file::RigFile;
+use crate::identify::bridge_zero;
 use crate::identify::term::Parameter;
 
 /// A model file's numbers are known within 20 %.
@@ -31,6 +33,8 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             bristles_n_per_m: f64::INFINITY,
             bristles_alone: false,
             late_ms: 0.0,
+            friction_zero_nm: 0.0,
+            normal_zero_n: 0.0,
         }
     } else {
         Numbers {
@@ -44,6 +48,8 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             bristles_n_per_m: if block { get("sigma0_n_per_m") } else { f64::INFINITY },
             bristles_alone: !block,
             late_ms: 0.0,
+            friction_zero_nm: 0.0,
+            normal_zero_n: 0.0,
         }
     };
     let mut free = Vec::new();
@@ -77,6 +83,23 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
     };
     free.push(BaseParameter { role: Role::Late, parameter: late });
     Baseline { numbers, free }
+}
+
+impl Baseline {
+    /// With the zeros of the bridges, which are known as well as bridges are.
+    #[must_use]
+    pub fn with_bridge_zeros(mut self, rig: &RigFile) -> Self {
+        let [friction_nm, normal_n] = bridge_zero::standard_deviations(rig);
+        for (role, name, sd) in [
+            (Role::FrictionZero, "friction_zero_nm", friction_nm),
+            (Role::NormalZero, "normal_zero_n", normal_n),
+        ] {
+            let (step, reach) = (0.5 * sd, sd);
+            let parameter = Parameter { amplitude: false, step, reach, ..Parameter::amplitude(name, sd) };
+            self.free.push(BaseParameter { role, parameter });
+        }
+        self
+    }
 }
 
 /// Whether the model has a block in series with the slip.

@@ -9,6 +9,7 @@ use model_core::sensor::{LEAST_GAIN, SecondOrder, SecondOrderState, SensorChain,
 
 use super::change::Change;
 use super::log::{ContactLog, OBSERVED_OVER};
+use super::problem::Numbers;
 use crate::identify::filters::{before_mode, shifted, smoothed_flat};
 use crate::identify::grid::STEP_S;
 
@@ -42,7 +43,7 @@ pub fn before_ringing(shown: &[f64], mode: (f64, f64), step_s: f64) -> Option<Ve
 /// amplifier nor its lateness.
 pub fn error_nm(logs: &[ContactLog], change: &Change) -> Option<Vec<Vec<f64>>> {
     let changed = change.zero_nm.is_some() || change.gain.is_some() || change.late_s != 0.0;
-    let of_log = |(at, log)| Channel::new(log, at, change, 0.0).error_nm();
+    let of_log = |(at, log)| Channel::of_effects(log, at, change).error_nm();
     changed.then(|| logs.iter().enumerate().map(of_log).collect())
 }
 
@@ -55,19 +56,30 @@ pub(super) struct Channel<'a> {
     /// What the gain has drifted by, relative.
     gain: Option<&'a [f64]>,
     zero_nm: Option<&'a [f64]>,
+    /// The same that never changes, N m.
+    steady_zero_nm: f64,
     ends_nm: Option<(f64, f64)>,
 }
 
 impl<'a> Channel<'a> {
-    /// Of the log at this place, as a hypothesis changes it; `late_ms` is the baseline's.
-    pub(super) fn new(log: &'a ContactLog, at: usize, change: &'a Change, late_ms: f64) -> Self {
+    /// Of the log at this place, as a hypothesis changes it.
+    pub(super) fn new(log: &'a ContactLog, at: usize, change: &'a Change, numbers: &Numbers) -> Self {
+        let Numbers { late_ms, friction_zero_nm, .. } = *numbers;
+        let of_effects = Self::of_effects(log, at, change);
+        let late = of_effects.late + 1e-3 * late_ms / log.grid.step_s;
+        Self { late, steady_zero_nm: friction_zero_nm, ..of_effects }
+    }
+
+    /// As effects change it.
+    fn of_effects(log: &'a ContactLog, at: usize, change: &'a Change) -> Self {
         let step_s = log.grid.step_s;
         Self {
             log,
-            late: log.friction_late + (1e-3 * late_ms + change.late_s) / step_s,
+            late: log.friction_late + change.late_s / step_s,
             ringing: ringing(change.mode, step_s),
             gain: change.gain.as_ref().map(|gain| gain[at].as_slice()),
             zero_nm: change.zero_nm.as_ref().map(|zero| zero[at].as_slice()),
+            steady_zero_nm: 0.0,
             ends_nm: change.ends_nm,
         }
     }
@@ -91,8 +103,9 @@ impl<'a> Channel<'a> {
     pub(super) fn seen_nm(&mut self) -> Vec<f64> {
         let log = self.log;
         let seen = if self.ringing.is_none() && self.gain.is_none() && self.zero_nm.is_none() {
-            // The same, smoothed once for all hypotheses: smoothing and a delay commute.
-            self.before_delay(Cow::Borrowed(&log.observed_nm))
+            // The same, smoothed once for all hypotheses: smoothing commutes with a delay and with a steady zero.
+            let delayed = self.before_delay(Cow::Borrowed(&log.observed_nm));
+            self.before_amplifier(delayed)
         } else {
             self.undo(Cow::Borrowed(&log.friction_nm))
         };
@@ -133,6 +146,10 @@ impl<'a> SensorChain for Channel<'a> {
             torque_nm =
                 changed(torque_nm, |torque| torque.iter_mut().zip(zero_nm).for_each(|(t, z)| *t += z));
         }
+        if self.steady_zero_nm != 0.0 {
+            torque_nm =
+                changed(torque_nm, |torque| torque.iter_mut().for_each(|t| *t += self.steady_zero_nm));
+        }
         torque_nm
     }
 
@@ -154,6 +171,9 @@ impl<'a> SensorUndo for Channel<'a> {
     }
 
     fn before_amplifier(&mut self, mut shown_nm: Self::Signal) -> Self::Signal {
+        if self.steady_zero_nm != 0.0 {
+            shown_nm = changed(shown_nm, |shown| shown.iter_mut().for_each(|s| *s -= self.steady_zero_nm));
+        }
         if let Some(zero_nm) = self.zero_nm {
             shown_nm = changed(shown_nm, |shown| shown.iter_mut().zip(zero_nm).for_each(|(s, z)| *s -= z));
         }
@@ -181,15 +201,24 @@ fn changed<'a>(series: Cow<'a, [f64]>, change: impl FnOnce(&mut [f64])) -> Cow<'
 mod tests {
     use super::*;
     use crate::files::log::Log;
+    use crate::files::model_file::ModelFile;
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
+    use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
 
     const COUNT: usize = 2000;
     /// Samples.
     const LATE: f64 = 7.4;
+    /// What the bridge shows where nothing pulls, N m.
+    const STEADY_NM: f64 = 0.2;
 
     fn series(of: impl Fn(f64) -> f64) -> Vec<f64> {
         (0..COUNT).map(|i| of(i as f64)).collect()
+    }
+
+    fn numbers(late_ms: f64) -> Numbers {
+        let model = ModelFile::assumed(&[]).unwrap();
+        Numbers { late_ms, friction_zero_nm: STEADY_NM, ..baseline(&model, KNOWN_WITHIN).numbers }
     }
 
     /// A log whose friction channel shows this, N m, on a rig that is not late.
@@ -220,10 +249,10 @@ mod tests {
             late_s: 1e-3 * (LATE - 2.0),
             ..Change::default()
         };
-        let log = log(series(shown));
-        let mut channel = Channel::new(&log, 0, &change, 2.0);
+        let log = log(series(|i| shown(i) + STEADY_NM));
+        let mut channel = Channel::new(&log, 0, &change, &numbers(2.0));
         // Cubics between samples. A gain and a zero that were not late would be 0.02 N m off.
-        assert!(off(&channel.shown_nm(series(torque)), &series(shown)) < 1e-5);
+        assert!(off(&channel.shown_nm(series(torque)), &log.friction_nm) < 1e-5);
         assert!(off(&channel.seen_nm(), &series(torque)) < 1e-5);
     }
 
@@ -258,13 +287,13 @@ mod tests {
     fn a_zero_that_jumps_does_not_shake_the_mode_there_nor_back() {
         let zero = |i: f64| if i < 1000.0 { 0.0 } else { 0.7 };
         let change = Change {
-            zero_nm: Some(vec![series(zero)]),
+            zero_nm: Some(vec![series(|i| zero(i) - STEADY_NM)]),
             mode: Some((80.0, 0.01)),
             ends_nm: Some((-5.0, 2.5)),
             ..Change::default()
         };
         let log = log(series(|i| 2.0 + zero(i)));
-        let mut channel = Channel::new(&log, 0, &change, 0.0);
+        let mut channel = Channel::new(&log, 0, &change, &numbers(0.0));
         assert!(off(&channel.shown_nm(vec![2.0; COUNT]), &series(|i| (2.0 + zero(i)).min(2.5))) < 1e-12);
         let seen = off(&channel.seen_nm(), &vec![2.0; COUNT]);
         // The way back through the mode passes what stands to 0.2 %; a zero left in it would be several N m off at its jump.
@@ -275,7 +304,7 @@ mod tests {
     fn where_the_amplifier_adds_nothing_the_smoothed_channel_stands_for_the_raw_one() {
         let log = log(series(|i| (0.05 * i).sin() + 0.3 * (1.3 * i).cos()));
         let change = Change { late_s: 1e-3 * LATE, ..Change::default() };
-        let mut channel = Channel::new(&log, 0, &change, 0.0);
+        let mut channel = Channel::new(&log, 0, &change, &numbers(0.0));
         let whole = channel.undo(Cow::Borrowed(&log.friction_nm)).into_owned();
         assert!(off(&channel.seen_nm(), &whole) < 1e-12);
     }

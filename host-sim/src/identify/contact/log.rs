@@ -1,5 +1,7 @@
 //! A contact log made ready for the observer of the slip.
 
+use std::borrow::Cow;
+
 use super::ringing::Ringing;
 use crate::files::log::{Log, unwrapped};
 use crate::files::rig_file::RigFile;
@@ -149,6 +151,14 @@ impl ContactLog {
         let pairs = self.root_speed_m_s.iter().zip(&other.root_speed_m_s);
         let error = rms(&pairs.map(|(a, b)| a - b).collect::<Vec<_>>());
         Self { speed_noise_m_s: self.speed_noise_m_s.hypot(error), ..self.clone() }
+    }
+
+    /// The normal force where its bridge shows so much when nothing presses, N.
+    pub fn load_above(&self, zero_n: f64) -> Cow<'_, [f64]> {
+        if zero_n == 0.0 {
+            return Cow::Borrowed(&self.load_n);
+        }
+        self.load_n.iter().map(|load| load - zero_n).collect()
     }
 
     /// Values of the friction channel beyond which it is at an end of its range, N m.

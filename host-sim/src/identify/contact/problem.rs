@@ -58,6 +58,10 @@ pub enum Role {
     Factor,
     /// How late the channel is, ms; not a logarithm.
     Late,
+    /// What the friction bridge shows where nothing pulls, N m; not a logarithm.
+    FrictionZero,
+    /// What the normal bridge shows where nothing presses, N; not a logarithm.
+    NormalZero,
 }
 
 /// Numbers of the contact before anything is fitted.
@@ -83,6 +87,10 @@ pub struct Numbers {
     pub bristles_alone: bool,
     /// Lateness of the channel beyond the rig file's, ms.
     pub late_ms: f64,
+    /// What the friction bridge shows where nothing pulls, N m.
+    pub friction_zero_nm: f64,
+    /// What the normal bridge shows where nothing presses, N.
+    pub normal_zero_n: f64,
 }
 
 /// A baseline parameter.
@@ -126,10 +134,23 @@ impl Baseline {
                     numbers.late_ms = value;
                     continue;
                 }
+                Role::FrictionZero => {
+                    numbers.friction_zero_nm = value;
+                    continue;
+                }
+                Role::NormalZero => {
+                    numbers.normal_zero_n = value;
+                    continue;
+                }
             };
             *slot = value.exp();
         }
         numbers
+    }
+
+    /// Deviation of what is known of a parameter; 0 where it is not free.
+    pub fn deviation_of(&self, role: Role) -> f64 {
+        self.free.iter().find(|base| base.role == role).map_or(0.0, |base| base.parameter.sd)
     }
 
     /// A fitted value within its bounds.
@@ -272,18 +293,19 @@ impl<'a> Problem<'a> {
         let mut all = Vec::with_capacity(self.logs.len());
         for (at, log) in self.logs.iter().enumerate() {
             // What the channel adds is taken off first, so that it changes the observed slip too.
-            let mut channel = Channel::new(log, at, change, numbers.late_ms);
+            let mut channel = Channel::new(log, at, change, &numbers);
             let seen_nm = channel.seen_nm();
             let mut force_n: Vec<f64> = seen_nm.iter().map(|t| t / log.radius_m).collect();
             let ends = channel.ends(seen_nm);
             let usual = rms(&log.root_speed_m_s);
+            let load_n = log.load_above(numbers.normal_zero_n);
             let factor = change.log_factor.as_ref().map(|m| exponentials(&m[at]));
             let drive = Drive {
                 step_s: log.grid.step_s,
                 interval_s: log.grid.interval_s(),
                 dense: log.grid.is_dense(),
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
-                load_n: &log.load_n,
+                load_n: &load_n,
                 force_n: &[],
                 ends: ends.as_deref(),
                 factor: factor.as_deref(),
@@ -584,5 +606,48 @@ impl<'a> Problem<'a> {
             curvature: &h,
         };
         [1.0, CONTACT_SHARE].map(|share| at.log_evidence(share, |_| 0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::baseline::{KNOWN_WITHIN, baseline};
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::model_file::ModelFile;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+
+    #[test]
+    fn bridges_that_show_something_where_nothing_pulls_are_seen_through() {
+        const COUNT: usize = 3000;
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let series = |of: &dyn Fn(f64) -> f64| (0..COUNT).map(|i| of(1e-3 * i as f64)).collect::<Vec<f64>>();
+        let log = |friction_zero_nm: f64, normal_zero_n: f64| {
+            let mut log = Log::default();
+            log.set_signal(Signal::Time, series(&|t| t));
+            log.set_signal(Signal::M2Speed, series(&|t| 4.0 * (2.0 * t).sin()));
+            log.set_signal(Signal::NormalForce, series(&|t| 60.0 + 20.0 * (3.0 * t).cos() + normal_zero_n));
+            let torque_nm = |t: f64| 2.5 * (30.0 * (2.0 * t).sin()).tanh() + 0.1 * (9.0 * t).cos();
+            log.set_signal(Signal::FrictionTorque, series(&|t| torque_nm(t) + friction_zero_nm));
+            ContactLog::new(&log, &rig).unwrap()
+        };
+        let baseline = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).with_bridge_zeros(&rig);
+        let predict = |log: ContactLog, p: &[f64]| {
+            Problem::new(std::slice::from_ref(&log), &baseline, &[]).predict(&[], p).shown_nm
+        };
+        let without: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
+        let mut with = without.clone();
+        let last = with.len();
+        with[last - 2..].copy_from_slice(&[0.02, 0.7]);
+        let [friction_zero_nm, normal_zero_n] = [last - 2, last - 1].map(|at| baseline.bounded(&with, at));
+        assert!(friction_zero_nm > 0.01 && normal_zero_n > 0.4, "{friction_zero_nm} {normal_zero_n}");
+        let (ideal, shown) =
+            (predict(log(0.0, 0.0), &without), predict(log(friction_zero_nm, normal_zero_n), &with));
+        let off = |zero_nm: f64| {
+            let each = ideal.iter().zip(&shown).map(|(ideal, shown)| (ideal + zero_nm - shown).abs());
+            each.fold(0.0, f64::max)
+        };
+        assert!(off(friction_zero_nm) < 1e-9, "{}", off(friction_zero_nm));
     }
 }

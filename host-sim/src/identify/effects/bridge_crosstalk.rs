@@ -17,6 +17,10 @@ impl Effect for BridgeCrosstalk {
         }
     }
 
+    fn is_like_a_bridges_error(&self) -> bool {
+        true
+    }
+
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
         let (load, torque) = (view.scales.load_n, view.scales.torque_nm);
         let power = |n: i32| {

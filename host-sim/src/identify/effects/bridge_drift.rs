@@ -127,6 +127,10 @@ impl Effect for BridgeDrift {
         }
     }
 
+    fn is_like_a_bridges_error(&self) -> bool {
+        true
+    }
+
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
         let s = view.scales;
         let (s_time, s_torque, s_load) = (s.time_s, s.torque_nm, s.load_n);

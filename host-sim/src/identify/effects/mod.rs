@@ -119,6 +119,11 @@ pub trait Effect: Sync {
         self.about().id
     }
 
+    /// Whether all that it does is what a bridge within its class may do too: then it is told beyond that only.
+    fn is_like_a_bridges_error(&self) -> bool {
+        false
+    }
+
     /// What it changes in the contact's balance, in one or more forms.
     fn contact(&self, _view: &ContactView<'_>) -> Vec<ContactTerm> {
         Vec::new()

@@ -29,6 +29,10 @@ impl Effect for TorqueOffset {
         }
     }
 
+    fn is_like_a_bridges_error(&self) -> bool {
+        true
+    }
+
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let size = view.scales.own;
         let ones = |log: Option<usize>| -> Vec<f64> {
