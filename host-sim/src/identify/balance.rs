@@ -242,19 +242,25 @@ impl Balance {
         Solved { set: set.to_vec(), ..self.solve_forms(&chosen) }
     }
 
-    /// What a set leaves where the errors of the sensors are those of another solution.
-    pub fn left_with_sensors_of(
+    /// Of what a solution takes for errors of the sensors as much as they are known to have: a deviation of each.
+    pub fn possible_errors(&self, values: &[f64]) -> Vec<f64> {
+        let sensors = self.base.iter().zip(values).skip(self.sensors);
+        sensors.map(|((q, _), value)| value.clamp(q.mean - q.sd, q.mean + q.sd)).collect()
+    }
+
+    /// What a set leaves beside these errors of the sensors.
+    pub fn left_beside_errors(
         &self,
-        held: &Solved,
+        errors: &[f64],
         alternatives: &[Alternative],
         set: &[usize],
     ) -> Vec<f64> {
         let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
-        let parameters = self.base.iter().map(|b| b.0.clone()).enumerate();
-        let hold = |(at, q): (usize, Parameter)| {
-            if at < self.sensors { q } else { Parameter { mean: held.p[at], sd: HELD * q.sd, ..q } }
-        };
-        self.solved(parameters.map(hold).collect(), &chosen, None).residual
+        let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
+        for (q, error) in parameters.iter_mut().skip(self.sensors).zip(errors) {
+            (q.mean, q.sd) = (*error, HELD * q.sd);
+        }
+        self.solved(parameters, &chosen, None).residual
     }
 
     /// Solves these forms; the set of what it gives is empty.
@@ -579,10 +585,12 @@ mod tests {
         let [with, without] = [&[0][..], &[]].map(|set| balance.solve(&forms, set));
         assert!(with.log_evidence > without.log_evidence + 10.0);
         assert!((with.p[2] - 1.0).abs() < 0.1, "{:?}", with.p);
-        // Rows are so many that the zero takes nearly all of it without the cause.
+        // Rows are so many that the zero takes nearly all of it without the cause; it may be a tenth of it.
         assert!(balance.difference(&with.residual, &without.residual) < 0.2);
-        let held = balance.left_with_sensors_of(&with, &forms, &[]);
-        assert!((balance.difference(&with.residual, &held) - with.p[2]).abs() < 0.01);
+        let errors = balance.possible_errors(&without.p);
+        assert!((errors[0] - 0.1).abs() < 1e-12, "{errors:?}");
+        let [with, without] = [&[0][..], &[]].map(|set| balance.left_beside_errors(&errors, &forms, set));
+        assert!((balance.difference(&with, &without) - 0.9).abs() < 0.05);
     }
 
     #[test]

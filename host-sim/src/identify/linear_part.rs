@@ -99,13 +99,18 @@ impl Linear {
         self.solved.extend(solved);
     }
 
-    /// What each alternative of a set does, the others fitted again without it. What is known of the sensors stays as it is: a
-    /// large cause that has the shape of their errors would be taken for one, at odds that the data do not hear.
+    /// What each alternative of a set does, the others fitted again without it, once the sensors have shown the errors that they
+    /// may have. A large cause with the shape of such an error would be taken for one where its rows outweigh what is known of
+    /// the sensor, and a small one is none that a sensor may make.
     fn contributions(&self, solved: &Solved) -> Vec<Contribution> {
         let own = |a: &usize| {
             let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
-            let without = self.balance.left_with_sensors_of(solved, &self.alternatives, &set);
-            rest::contribution(&self.balance, self.alternatives[*a].effect, &solved.residual, &without)
+            let known = self.solved.iter().find(|other| other.set == set).map(|other| other.p.clone());
+            let without = known.unwrap_or_else(|| self.balance.solve(&self.alternatives, &set).p);
+            let of_sensors = self.balance.possible_errors(&without);
+            let [with, without] = [&solved.set, &set]
+                .map(|set| self.balance.left_beside_errors(&of_sensors, &self.alternatives, set));
+            rest::contribution(&self.balance, self.alternatives[*a].effect, &with, &without)
         };
         solved.set.iter().map(own).collect()
     }
