@@ -40,6 +40,8 @@ const FIRST_BEND: f64 = 0.1;
 /// Names of the width of a dead zone and of a soft stage.
 const GAP: &str = "gap_rad";
 const SOFT_STAGE: &str = "soft_stage_rad";
+/// Name of the share of the bearing's torque that the disc bears.
+const BEARING_ON_DISC: &str = "bearing_on_disc_share";
 
 /// Numbers of a coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +59,8 @@ pub struct Coupling {
     pub bend: f64,
     /// Share of the soft stage in the stiffness; 0 where there is none.
     pub soft_share: f64,
+    /// Whether the bearing carries the disc; else the motor.
+    pub bearing_on_disc: bool,
 }
 
 /// Torque over the twist, and what it acts between.
@@ -71,6 +75,8 @@ pub struct Law {
     pub stiffness: f64,
     /// b.
     pub half_gap: f64,
+    /// Share of the bearing's torque on the disc.
+    pub bearing_on_disc: f64,
     damping: f64,
     rounding: f64,
     soft_share: f64,
@@ -124,7 +130,20 @@ impl Law {
 impl Coupling {
     /// A spring without play that takes in proportion.
     pub fn spring(mode_hz: f64, damping_ratio: f64, disc_share: f64) -> Self {
-        Self { mode_hz, damping_ratio, disc_share, gap_rad: 0.0, bend: 0.0, soft_share: 0.0 }
+        Self {
+            mode_hz,
+            damping_ratio,
+            disc_share,
+            gap_rad: 0.0,
+            bend: 0.0,
+            soft_share: 0.0,
+            bearing_on_disc: false,
+        }
+    }
+
+    /// The same with the bearing on the motor's side of it, and on the disc's.
+    pub fn borne_either_way(&self) -> [Self; 2] {
+        [false, true].map(|bearing_on_disc| Self { bearing_on_disc, ..*self })
     }
 
     /// The same that bends a little.
@@ -163,6 +182,7 @@ impl Coupling {
             omega_rad_s: omega,
             stiffness,
             half_gap,
+            bearing_on_disc: f64::from(u8::from(self.bearing_on_disc)),
             damping: 2.0 * self.damping_ratio * disc_inertia * omega,
             rounding: if self.is_play() { self.bend } else { 0.0 },
             soft_share: self.soft_share,
@@ -203,6 +223,7 @@ impl Coupling {
             ("gap_rounding", law.rounding),
             ("soft_stage_share", self.soft_share),
             ("hardening_per_rad2", law.hardening_per_rad2),
+            (BEARING_ON_DISC, law.bearing_on_disc),
         ];
         let own = own.into_iter().filter(|(_, value)| *value > 0.0);
         always.into_iter().chain(own).map(|(name, value)| (name.to_string(), value)).collect()
@@ -221,6 +242,7 @@ impl Coupling {
             gap_rad: get(GAP).max(get(SOFT_STAGE)),
             bend: get("gap_rounding").max(hardening),
             soft_share: get("soft_stage_share"),
+            bearing_on_disc: get(BEARING_ON_DISC) > 0.0,
         }
     }
 
@@ -243,6 +265,7 @@ impl Coupling {
             gap_rad: if self.gap_rad > 0.0 { own(true).exp() } else { 0.0 },
             bend: own(self.bend > 0.0),
             soft_share: own(self.soft_share > 0.0),
+            bearing_on_disc: self.bearing_on_disc,
         }
     }
 

@@ -1,6 +1,8 @@
 //! Motor and disc apart: the disc behind a coupling (`coupling.rs`), turned by the measured motion of the motor.
 //!
-//! J_d ω̇_d = T_s(θ_m − θ_d, ω_m − ω_d) − T_f,   T2 = J_m ω̇_m + bearing + T_s
+//! J_d ω̇_d = T_s(θ_m − θ_d, ω_m − ω_d) − T_f − s bearing,   T2 = J_m ω̇_m + (1 − s) bearing + T_s
+//!
+//! with s = 1 where the bearing carries the disc and 0 where it carries the motor.
 //!
 //! θ_m and T_f are measured, so only the disc is integrated; a weak pull towards the torque that the motor's own balance
 //! says is in the shaft keeps it from drifting through the gap, whose crossings are too sensitive to be predicted for long.
@@ -58,11 +60,12 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &[f64], pull: f64) -> (Vec<f
     let free = vec![0.0; n];
     let friction = log.friction.as_ref().unwrap_or(&free);
     let [effort, acceleration] = &log.quick;
+    let on_disc = law.bearing_on_disc;
     let observed: Vec<f64> = effort
         .iter()
         .zip(acceleration)
         .zip(bearing)
-        .map(|((t, a), b)| t - law.motor_inertia * a - b)
+        .map(|((t, a), b)| t - law.motor_inertia * a - (1.0 - on_disc) * b)
         .collect();
     // No smaller than what noise makes: inside the gap the torque is nothing.
     let sure = 0.1 * super::filters::rms(&observed);
@@ -81,7 +84,8 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &[f64], pull: f64) -> (Vec<f
             let (motor, rate) = between([x[i - 1], x[i]], [dt * va, dt * vb], part);
             q += 0.5 * h * w;
             let shaft = law.torque(motor - q, rate / dt - w);
-            w += h * (shaft - (friction[i - 1] + (friction[i] - friction[i - 1]) * part)) / disc;
+            let borne = friction[i - 1] + (friction[i] - friction[i - 1]) * part + on_disc * bearing[i];
+            w += h * (shaft - borne) / disc;
             q += 0.5 * h * w;
         }
         let twist = x[i] - q;
@@ -126,14 +130,18 @@ fn alternative(
     let mut added = Vec::with_capacity(view.balance.response.len());
     let mut from = 0;
     for log in view.logs {
-        let (torque, _) = shaft_torque(log, &law, &bearing[from..from + log.len()], pull);
+        let bearing = &bearing[from..from + log.len()];
+        let (torque, _) = shaft_torque(log, &law, bearing, pull);
         from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
         let change: Vec<f64> = torque
             .iter()
             .enumerate()
-            .map(|(i, t)| friction.map_or(0.0, |f| f[i]) - t.clamp(-most, most))
+            .map(|(i, t)| {
+                // Of what the disc bears the friction stands in the response, and the bearing beside it.
+                friction.map_or(0.0, |f| f[i]) + law.bearing_on_disc * bearing[i] - t.clamp(-most, most)
+            })
             .collect();
         if change.iter().any(|x| !x.is_finite()) {
             return None;
@@ -220,8 +228,9 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
     };
     let bearing = view.balance.bearing(view.company.forms);
     let starts = |bends: bool| -> Vec<Trial> {
-        let of = |numbers: &Coupling| trial(&if bends { numbers.bent() } else { *numbers }, &bearing, PULL);
-        let mut tried: Vec<Trial> = grid.par_iter().filter_map(of).collect();
+        let of = |numbers: Coupling| trial(&if bends { numbers.bent() } else { numbers }, &bearing, PULL);
+        let ways: Vec<Coupling> = grid.iter().flat_map(Coupling::borne_either_way).collect();
+        let mut tried: Vec<Trial> = ways.into_par_iter().filter_map(of).collect();
         tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
         // Of each width the best, so that the fits do not all start in one valley.
         let mut widths: Vec<f64> = Vec::new();
