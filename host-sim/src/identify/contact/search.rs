@@ -294,15 +294,19 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
     current
 }
 
-/// A set with the law of an effect, at the end, in place of the form of it that stands at a place.
+/// A set with the best law of an effect, at the end, in place of the form of it that stands at a place.
 fn with_law(problem: &Problem<'_>, fit: &Fit, place: usize, iterations: usize) -> Option<Fit> {
     let effect = problem.terms[fit.terms[place]].effect;
-    let law = problem.terms.iter().position(|term| term.law && term.effect == effect)?;
+    let law = |at: &usize| problem.terms[*at].law && problem.terms[*at].effect == effect;
     let others = without(problem, fit, place);
-    let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
-    let starts = problem.starts(&others, law).into_par_iter();
-    let fits =
-        starts.map(|start| problem.fit(&terms, [others.p.as_slice(), &start].concat(), iterations, None));
+    let starts: Vec<(usize, Vec<f64>)> = (0..problem.terms.len())
+        .filter(law)
+        .flat_map(|law| problem.starts(&others, law).into_iter().map(move |start| (law, start)))
+        .collect();
+    let fits = starts.into_par_iter().map(|(law, start)| {
+        let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
+        problem.fit(&terms, [others.p.as_slice(), &start].concat(), iterations, None)
+    });
     fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 

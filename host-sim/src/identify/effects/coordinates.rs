@@ -35,6 +35,8 @@ pub struct Scales {
     pub heat_j: [f64; 3],
     /// Distance, m.
     pub distance_m: f64,
+    /// Distance slid in all of them, m.
+    pub slid_m: f64,
     /// Length, s.
     pub time_s: f64,
     /// Usual load, N: the root of the mean square.
@@ -71,10 +73,13 @@ impl Scales {
         let usual =
             |of: &dyn Fn(&ContactLog) -> f64| rms(&logs.iter().map(of).collect::<Vec<_>>()).max(1e-12);
         let end = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+        let slid =
+            |log: &ContactLog| log.root_speed_m_s.iter().map(|v| v.abs() * log.grid.step_s).sum::<f64>();
         Self {
             heat_j: HEAT_TIMES_S
                 .map(|time_s| largest(&|log| end(held(&power(log), log.grid.step_s, time_s)))),
-            distance_m: largest(&|log| log.root_speed_m_s.iter().map(|v| v.abs() * log.grid.step_s).sum()),
+            distance_m: largest(&slid),
+            slid_m: logs.iter().map(slid).sum(),
             time_s: largest(&|log| log.grid.time_s.last().copied().unwrap_or(0.0)),
             load_n: usual(&|log| rms(&log.load_n)),
             speed_m_s: usual(&|log| rms(&log.root_speed_m_s)),
