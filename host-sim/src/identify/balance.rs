@@ -248,6 +248,15 @@ impl Balance {
         sensors.map(|((q, _), value)| value.clamp(q.mean - q.sd, q.mean + q.sd)).collect()
     }
 
+    /// What a solution leaves without its errors of the sensors.
+    pub fn left_by_causes(&self, solved: &Solved) -> Vec<f64> {
+        let mut left = solved.residual.clone();
+        for ((_, column), value) in self.base.iter().zip(&solved.p).skip(self.sensors) {
+            left.iter_mut().zip(column).for_each(|(left, x)| *left += value * x);
+        }
+        left
+    }
+
     /// What a set leaves beside these errors of the sensors.
     pub fn left_beside_errors(
         &self,
@@ -587,6 +596,9 @@ mod tests {
         assert!((with.p[2] - 1.0).abs() < 0.1, "{:?}", with.p);
         // Rows are so many that the zero takes nearly all of it without the cause; it may be a tenth of it.
         assert!(balance.difference(&with.residual, &without.residual) < 0.2);
+        // That the zero does what the cause would is a difference all the same.
+        let causes = [&with, &without].map(|solved| balance.left_by_causes(solved));
+        assert!(balance.difference(&causes[0], &causes[1]) > 0.7);
         let errors = balance.possible_errors(&without.p);
         assert!((errors[0] - 0.1).abs() < 1e-12, "{errors:?}");
         let [with, without] = [&[0][..], &[]].map(|set| balance.left_beside_errors(&errors, &forms, set));

@@ -159,6 +159,17 @@ impl ContactPart {
         &self.ranked[place].fit
     }
 
+    /// RMS of the difference of what two sets predict, relative to the signal; bridges whose zeros do what a cause would are a
+    /// difference.
+    pub fn apart(&self, a: usize, b: usize) -> f64 {
+        let problem = self.problem();
+        let [a, b] = [a, b].map(|place| self.fit(place));
+        let [of_a, of_b] = [a, b].map(|fit| self.baseline.numbers(&fit.p));
+        let of_friction = (of_a.friction_zero_nm - of_b.friction_zero_nm) / self.scales.torque_nm;
+        let of_load = (of_a.normal_zero_n - of_b.normal_zero_n) / self.scales.load_n;
+        search::difference(&problem, &a.r, &b.r).hypot(of_friction).hypot(of_load)
+    }
+
     /// The sets found, for the table.
     pub fn candidates(&self) -> Vec<Candidate> {
         // A sum of columns finds its shape, a law has one.

@@ -7,6 +7,7 @@
 use super::contact::log::ContactLog;
 use super::contact_part::{self, ContactPart};
 use super::drive::{DriveLog, DrivePrior};
+use super::law_form::LAW_FORM;
 use super::linear_part::{self, Linear};
 use super::normal_load::NormalLoadLog;
 use super::rest::{self, Rest};
@@ -112,6 +113,7 @@ pub fn judge(
         linear_stage,
     };
     judgement.weigh_rests();
+    judgement.share_with_alike();
     Ok(judgement)
 }
 
@@ -226,6 +228,39 @@ impl Judgement {
         self.hypotheses = weighed.into_iter().map(|(_, h, _)| h).collect();
     }
 
+    /// What a cause in place of one of the answer's predicts alike, to what a law's form is known to, cannot be told from it,
+    /// however sure the evidence is of the difference: each is as likely as the other.
+    fn share_with_alike(&mut self) {
+        let best = self.best();
+        let alike: Vec<usize> = (1..self.hypotheses.len())
+            .filter(|at| best.in_place_of(&self.hypotheses[*at]).is_some_and(|own| self.alike(own, *at)))
+            .collect();
+        let together = || std::iter::once(0).chain(alike.iter().copied());
+        let each =
+            together().map(|at| self.hypotheses[at].probability).sum::<f64>() / (1 + alike.len()) as f64;
+        for at in together().collect::<Vec<_>>() {
+            self.hypotheses[at].probability = each;
+        }
+    }
+
+    /// Whether the hypothesis at a place predicts what the answer does, to the form of that one's cause at `own`.
+    fn alike(&self, own: usize, at: usize) -> bool {
+        let (best, other) = (self.best(), &self.hypotheses[at]);
+        let place =
+            |h: &Hypothesis, part: Part| h.places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place);
+        let apart = |part: Part| -> Option<f64> {
+            let [a, b] = [place(best, part)?, place(other, part)?];
+            Some(match part {
+                Part::Friction => self.contact.as_ref()?.apart(a, b),
+                Part::Drive => self.drive.as_ref()?.apart(a, b),
+                Part::Pressure => self.normal_load.as_ref()?.apart(a, b),
+            })
+        };
+        let most =
+            [Part::Friction, Part::Drive, Part::Pressure].into_iter().filter_map(apart).fold(0.0, f64::max);
+        most < LAW_FORM * best.sizes[own]
+    }
+
     fn rests_of(&self, hypothesis: &Hypothesis) -> Rests {
         let place = |part: Part| hypothesis.places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place);
         let mut out = Vec::new();
@@ -250,5 +285,42 @@ impl Judgement {
         } else {
             "named"
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_that_predict_the_same_are_as_likely_as_each_other() {
+        let hypothesis = |effects: &[&'static str], probability| Hypothesis {
+            effects: effects.to_vec(),
+            log_weight: 0.0,
+            places: Vec::new(),
+            sizes: vec![0.1; effects.len()],
+            over_floor: vec![9.0; effects.len()],
+            probability,
+        };
+        let mut judgement = Judgement {
+            contact: None,
+            drive: None,
+            normal_load: None,
+            hypotheses: vec![
+                hypothesis(&["a"], 0.88),
+                hypothesis(&["b"], 0.04),
+                hypothesis(&["a", "c"], 0.03),
+                hypothesis(&[], 0.05),
+            ],
+            too_small: Vec::new(),
+            unknown: 0.0,
+            rests: Vec::new(),
+            notes: Vec::new(),
+            linear_stage: false,
+        };
+        // No balance tells them apart. That there is no cause, or one more, is another statement.
+        judgement.share_with_alike();
+        let found: Vec<f64> = judgement.hypotheses.iter().map(|h| h.probability).collect();
+        assert_eq!(found, [0.46, 0.46, 0.03, 0.05]);
     }
 }

@@ -115,6 +115,13 @@ impl Linear {
         solved.set.iter().map(own).collect()
     }
 
+    /// RMS of the difference of what two sets predict without the errors of the sensors, relative to the efforts: an error that
+    /// does what a cause would is a difference.
+    pub fn apart(&self, a: usize, b: usize) -> f64 {
+        let [a, b] = [a, b].map(|place| self.balance.left_by_causes(&self.solved[place]));
+        self.balance.difference(&a, &b) / self.balance.scale.max(1e-12)
+    }
+
     /// What a set leaves.
     pub fn rest(&self, place: usize) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());

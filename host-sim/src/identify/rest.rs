@@ -1,6 +1,7 @@
 //! What is left after the best hypothesis: how large, how far beyond noise, what it follows.
 
 use super::balance::Balance;
+use super::contact::change::Bridge;
 use super::contact::channel::before_ringing;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
@@ -159,14 +160,8 @@ pub struct Ground {
     blocks: [usize; 2],
     /// RMS of the channel, N m.
     signal: f64,
-    /// Deviation of the bridge's zero, N m.
-    class_nm: f64,
-}
-
-/// What the sizes of an effect are known to, relative to a signal in which a bridge's zero has this deviation.
-fn known(effect: &str, class: f64) -> f64 {
-    let of_bridge = effects::with_id(effect).is_some_and(|effect| effect.is_like_a_bridges_error());
-    if of_bridge { class.max(MODEL_FORM) } else { MODEL_FORM }
+    /// Deviations of the zeros of friction bridge and normal bridge, relative to what they usually show.
+    classes: [f64; 2],
 }
 
 impl Ground {
@@ -180,6 +175,9 @@ impl Ground {
         // Points between samples share the samples' noise.
         let of_log = |log: &ContactLog| vec![log.friction_noise_nm / log.grid.density.sqrt(); log.len()];
         let white: Vec<f64> = problem.logs.iter().flat_map(of_log).collect();
+        let signal = rms(&problem.measured().collect::<Vec<_>>()).max(1e-12);
+        let loads = problem.logs.iter().flat_map(|log| log.load_n.iter().copied());
+        let load_n = rms(&loads.collect::<Vec<_>>()).max(1e-12);
         let repeated = named().zip(&white).map(|(named, white)| (named * named - white * white).max(0.0));
         Self {
             rows: (0..deviation.len())
@@ -187,9 +185,12 @@ impl Ground {
                 .collect(),
             of_sample: dense.then(|| Noise::white(named().map(|named| NAMED_WITHIN * named).collect())),
             noise: Noise { repeated: if dense { repeated.collect() } else { Vec::new() }, white },
-            signal: rms(&problem.measured().collect::<Vec<_>>()).max(1e-12),
+            signal,
             blocks: blocks(step_s),
-            class_nm: problem.baseline.deviation_of(Role::FrictionZero),
+            classes: [
+                problem.baseline.deviation_of(Role::FrictionZero) / signal,
+                problem.baseline.deviation_of(Role::NormalZero) / load_n,
+            ],
             deviation,
         }
     }
@@ -214,8 +215,11 @@ impl Ground {
     /// What each cause of a fit does, from the fits without it. What is named of a block stays in both rests: where a transition
     /// is uncertain a wrong shape shows all the same.
     pub fn contributions(&self, problem: &Problem<'_>, fit: &Fit, without: &[Fit]) -> Vec<Contribution> {
-        let known =
-            fit.terms.iter().map(|term| known(problem.terms[*term].effect, self.class_nm / self.signal));
+        let known = fit.terms.iter().map(|term| match problem.terms[*term].error_of {
+            None => MODEL_FORM,
+            Some(Bridge::Friction) => self.classes[0].max(MODEL_FORM),
+            Some(Bridge::Normal) => self.classes[1].max(MODEL_FORM),
+        });
         let white = Noise::white(self.noise.white.clone());
         let rest = |fit: &Fit| self.beyond(&white, &self.left(problem, fit)).0.sqrt();
         let with = rest(fit);
@@ -353,10 +357,11 @@ pub fn contribution(balance: &Balance, effect: &str, residual: &[f64], without: 
     let left = structured(residual, &noise, &balance.used, block).0.sqrt();
     let change = balance.difference(residual, without);
     let scale = balance.scale.max(1e-12);
+    let of_bridge = effects::with_id(effect).is_some_and(|effect| effect.is_like_a_bridges_error());
     Contribution {
         size: change / scale,
         over_rest: change / (LEFT_SHARE * left),
-        known: known(effect, balance.bridge_zero / scale),
+        known: if of_bridge { (balance.bridge_zero / scale).max(MODEL_FORM) } else { MODEL_FORM },
     }
 }
 

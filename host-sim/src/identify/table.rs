@@ -96,6 +96,15 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
+    /// Place of the cause in whose place the other hypothesis has another one, where that is all that they differ in.
+    pub fn in_place_of(&self, other: &Self) -> Option<usize> {
+        let own = |effect: &&&'static str| !other.effects.contains(effect);
+        let mut only = self.effects.iter().filter(own);
+        let (first, more) = (only.next()?, only.next());
+        let place = self.effects.iter().position(|effect| effect == first);
+        place.filter(|_| more.is_none() && self.effects.len() == other.effects.len())
+    }
+
     /// ln evidence over all balances, without the prior of its causes.
     pub fn log_evidence(&self) -> f64 {
         self.log_weight - LOG_PRIOR * self.effects.len() as f64

@@ -62,6 +62,15 @@ fn add(to: &mut Option<Column>, columns: &[Column], sizes: &[f64]) {
     }
 }
 
+/// A bridge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bridge {
+    /// That of the friction torque.
+    Friction,
+    /// That of the normal force.
+    Normal,
+}
+
 /// One form of an effect in the contact's balance.
 pub struct ContactTerm {
     /// The effect's id.
@@ -76,6 +85,8 @@ pub struct ContactTerm {
     pub columns: Option<Vec<Column>>,
     /// Whether it is a law that can be exported: a law instead of columns.
     pub law: bool,
+    /// The bridge that does the same within its class, where all that it does is an error of one.
+    pub error_of: Option<Bridge>,
     /// What it changes.
     pub act: Act,
     /// The core's parameters for fitted values; may change the baseline's numbers. `None` where the form is no law.
@@ -105,6 +116,7 @@ impl ContactTerm {
             starts: Starts::At(vec![zero]),
             columns: Some(columns),
             law: false,
+            error_of: None,
             export: None,
             act: Box::new(move |sizes, change| change.add_log_factor(&shared, sizes)),
         }
@@ -126,6 +138,7 @@ impl ContactTerm {
             starts: Starts::At(vec![zero]),
             columns: None,
             law: false,
+            error_of: None,
             export: None,
             act: Box::new(move |sizes, change| {
                 let (zeros, gains) = sizes.split_at(zero_nm.len());
@@ -142,6 +155,13 @@ impl ContactTerm {
         export: impl Fn(&[f64], &mut Numbers) -> Vec<(String, f64)> + Send + Sync + 'static,
     ) -> Self {
         self.export = Some(Box::new(export));
+        self
+    }
+
+    /// As an error of a bridge, which is told beyond that one's class.
+    #[must_use]
+    pub fn as_error_of(mut self, bridge: Bridge) -> Self {
+        self.error_of = Some(bridge);
         self
     }
 
@@ -167,6 +187,7 @@ impl ContactTerm {
             starts,
             columns: None,
             law: false,
+            error_of: None,
             act: Box::new(act),
             export: None,
         }

@@ -2,7 +2,7 @@
 
 use super::{About, ContactView, DriveView, Effect};
 use crate::identify::balance::Alternative;
-use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::change::{Bridge, ContactTerm};
 use crate::identify::term::Parameter;
 
 /// The effect.
@@ -33,7 +33,9 @@ impl Effect for BridgeCrosstalk {
             let names = ["gain_nm_per_n", "bend_nm_per_n2"].map(String::from);
             names.into_iter().zip([p[0] * torque / load, p[1] * torque / (load * load)]).collect()
         };
-        vec![ContactTerm::amplifier(self.id(), "", [columns, Vec::new()], parameters).exported(move |p, _| export(p))]
+        vec![ContactTerm::amplifier(self.id(), "", [columns, Vec::new()], parameters)
+            .as_error_of(Bridge::Friction)
+            .exported(move |p, _| export(p))]
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {

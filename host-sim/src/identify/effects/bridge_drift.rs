@@ -5,7 +5,7 @@ use model_core::extension::bridge_drift::BridgeDrift as Law;
 use super::coordinates::saturating;
 use super::{About, ContactView, DriveView, Effect, NormalLoadView};
 use crate::identify::balance::Alternative;
-use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::change::{Bridge, ContactTerm};
 use crate::identify::term::{Column, Parameter};
 
 /// The effect.
@@ -153,8 +153,10 @@ impl Effect for BridgeDrift {
             let named = |bridge: &str| course.parameters(bridge, ["zero", "gain"], 1.0);
             [
                 ContactTerm::amplifier(self.id(), course.form(["friction", "friction wanders"]), friction, named("friction"))
+                    .as_error_of(Bridge::Friction)
                     .exported(move |p, _| export(course, p, "friction", s_time, s_torque)),
                 ContactTerm::factor(self.id(), course.form(["normal", "normal wanders"]), normal.concat(), named("normal"))
+                    .as_error_of(Bridge::Normal)
                     .exported(move |p, _| export(course, p, "normal", s_time, s_load)),
             ]
         };

@@ -119,7 +119,8 @@ pub trait Effect: Sync {
         self.about().id
     }
 
-    /// Whether all that it does is what a bridge within its class may do too: then it is told beyond that only.
+    /// Whether all that it does in a balance of torques is what the bridge in it may do within its class too: then it is told
+    /// beyond that only.
     fn is_like_a_bridges_error(&self) -> bool {
         false
     }
