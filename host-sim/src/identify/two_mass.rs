@@ -376,6 +376,11 @@ mod tests {
     /// A disc that is rubbed and swings behind a coupling under a torque of three sines, with rests, without which nothing tells the
     /// noise of the angle; that in counts of 120 000 a turn.
     fn log(torque: impl Fn(f64, f64) -> f64) -> DriveLog {
+        borne(torque, [0.02, 0.0])
+    }
+
+    /// The same with this viscous friction of a bearing of motor and disc.
+    fn borne(torque: impl Fn(f64, f64) -> f64, [of_motor, of_disc]: [f64; 2]) -> DriveLog {
         let h = 1e-3 / STEPS_PER_SAMPLE as f64;
         let (mut motor, mut disc) = ([0.0f64; 2], [0.0f64; 2]);
         let noise = white(8000, 3);
@@ -393,9 +398,9 @@ mod tests {
                 friction.push((disc[1] / 0.3).tanh() + 0.01 * noise[7999 - i / STEPS_PER_SAMPLE]);
             }
             let shaft = torque(motor[0] - disc[0], motor[1] - disc[1]);
-            motor[1] += h * (driven - 0.02 * motor[1] - shaft) / (INERTIA_KG_M2 - DISC_KG_M2);
+            motor[1] += h * (driven - of_motor * motor[1] - shaft) / (INERTIA_KG_M2 - DISC_KG_M2);
             let rubbed = (disc[1] / 0.3).tanh();
-            disc[1] += h * (shaft - rubbed) / DISC_KG_M2;
+            disc[1] += h * (shaft - rubbed - of_disc * disc[1]) / DISC_KG_M2;
             motor[0] += h * motor[1];
             disc[0] += h * disc[1];
         }
@@ -452,6 +457,18 @@ mod tests {
         let found = found("shaft_torsion", log, &grid);
         assert_near(&found, "stiffness_nm_per_rad", k, 0.03);
         assert_near(&found, "hardening_per_rad2", beta, 0.15);
+    }
+
+    #[test]
+    fn the_bearing_is_found_on_the_side_that_it_carries() {
+        for (viscous, on_disc) in [([0.04, 0.0], 0.0), ([0.0, 0.04], 1.0)] {
+            let (k, d) = (200.0, 0.1);
+            let log = borne(|twist, rate| k * twist + d * rate, viscous);
+            let found = found("shaft_torsion", log, &[Coupling::spring(20.0, 0.03, 0.65)]);
+            let share = found.iter().find(|(name, _)| name == "bearing_on_disc_share").map_or(0.0, |c| c.1);
+            assert_eq!(share, on_disc, "{found:?}");
+            assert_near(&found, "stiffness_nm_per_rad", k, 0.02);
+        }
     }
 
     #[test]
