@@ -307,10 +307,10 @@ mod tests {
             drive: None,
             normal_load: None,
             hypotheses: vec![
-                hypothesis(&["a"], 0.88),
-                hypothesis(&["b"], 0.04),
-                hypothesis(&["a", "c"], 0.03),
-                hypothesis(&[], 0.05),
+                hypothesis(&["a", "x"], 0.88),
+                hypothesis(&["b", "x"], 0.04),
+                hypothesis(&["b", "y"], 0.03),
+                hypothesis(&["x"], 0.05),
             ],
             too_small: Vec::new(),
             unknown: 0.0,
@@ -318,7 +318,7 @@ mod tests {
             notes: Vec::new(),
             linear_stage: false,
         };
-        // No balance tells them apart. That there is no cause, or one more, is another statement.
+        // No balance tells them apart. That there is one cause less, or that both are others, is another statement.
         judgement.share_with_alike();
         let found: Vec<f64> = judgement.hypotheses.iter().map(|h| h.probability).collect();
         assert_eq!(found, [0.46, 0.46, 0.03, 0.05]);

@@ -501,14 +501,16 @@ mod tests {
 
     #[test]
     fn what_bears_on_the_motor_is_told_with_the_coupling_and_not_without() {
-        let left = |k: f64| -> [f64; 2] {
+        let left = |(k, bearing_on_disc): (f64, bool)| -> [f64; 2] {
             let (omega, damping_ratio) = ((k / DISC_KG_M2).sqrt(), 0.01);
             let d = 2.0 * damping_ratio * k / omega;
-            let logs = [log(|twist, rate| k * twist + d * rate)];
+            let viscous = if bearing_on_disc { [0.0, 0.02] } else { [0.02, 0.0] };
+            let logs = [borne(|twist, rate| k * twist + d * rate, viscous)];
             let scales = DriveScales::new(&logs);
             let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
             let disc_share = DISC_KG_M2 / INERTIA_KG_M2;
-            let numbers = Coupling::spring(omega / std::f64::consts::TAU, damping_ratio, disc_share);
+            let spring = Coupling::spring(omega / std::f64::consts::TAU, damping_ratio, disc_share);
+            let numbers = Coupling { bearing_on_disc, ..spring };
             let constants = numbers.constants(&numbers.law(INERTIA_KG_M2, scales.effort));
             let viscous: Vec<f64> = logs[0].speed.iter().map(|w| 0.02 * w).collect();
             let residual = balance.solve(&[], &[]).residual;
@@ -525,7 +527,7 @@ mod tests {
                 };
                 let form = alternatives_of_grid("shaft_torsion", &view, Vec::new()).remove(0);
                 let added = form.response.expect("a coupling adds to the response");
-                // T2 − T_f + (T_f − T_s) − J_m ω̇ − the bearing: nothing that is fitted.
+                // T2 − T_f + (T_f − T_s) − J_m ω̇ − the bearing, wherever that is: nothing that is fitted.
                 let motor = INERTIA_KG_M2 - DISC_KG_M2;
                 let rest =
                     |i: usize| balance.response[i] + added[i] - motor * logs[0].acceleration[i] - viscous[i];
@@ -534,8 +536,10 @@ mod tests {
         };
         // From a mode near the quickest of the torque's sines, 3.7 Hz, which without the coupling is taken for the bearing, to one
         // that follows.
-        let found = [8.0, 20.0, 50.0, 200.0].map(left);
+        let found = [8.0, 20.0, 50.0, 200.0].map(|k| left((k, false)));
         assert!(found.iter().all(|[told, without]| told < without), "{found:?}");
         assert!(found[0][0] < 0.5 * found[0][1], "{found:?}");
+        let on_disc = [50.0, 200.0].map(|k| left((k, true)));
+        assert!(on_disc.iter().all(|[told, _]| *told < 0.05), "{on_disc:?}");
     }
 }
