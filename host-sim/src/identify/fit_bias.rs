@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contact::log::ContactLog;
-use super::contact::problem::{Baseline, Fit, Problem, Role};
+use super::contact::problem::{Baseline, Fit, Numbers, Problem};
 use super::fit_parameters::{set_all, values};
 use super::linear::{factor, normal_equations};
 use super::noise::{White, standard_deviation};
@@ -53,27 +53,31 @@ impl Resimulated<'_> {
         // What noise is in the motion would excite the contact where the rig's disc does not.
         let sliding_speed_m_s = on(&log.root_speed_m_s);
         let speed_rad_s: Vec<f64> = sliding_speed_m_s.iter().map(|v| v / log.radius_m).collect();
+        let Numbers { late_ms, friction_zero_nm, normal_zero_n, .. } = self.baseline.numbers(p);
         let inputs = ContactInputs {
             time_s: time_s.to_vec(),
             sliding_speed_m_s,
             disc_angle_rad: integral(time_s, &speed_rad_s),
-            normal_force_n: on(&log.load_n),
+            normal_force_n: on(&log.load_above(normal_zero_n)),
             initial_friction_n: log.smooth_nm.first().copied().unwrap_or_default() / log.radius_m,
         };
         let torque_nm = simulate_friction(&model, self.rig, &inputs)?;
-        let late = self.baseline.free.iter().position(|base| base.role == Role::Late);
-        let late_s = late.map_or(0.0, |at| 1e-3 * self.baseline.bounded(p, at));
         let behind_s = -BridgeModel::delay_s(&self.rig.normal_bridge);
         // A mean over samples is quieter than each.
         let of_sample = (time_s.len() as f64 / log.len().max(1) as f64).max(1.0).sqrt();
         let of_motion = |signal: Signal, values: Vec<f64>| {
             raw.signal(signal).map(|column| (signal, values, standard_deviation(column)))
         };
+        let above = |values: Vec<f64>, zero: f64| values.into_iter().map(|x| x + zero).collect::<Vec<f64>>();
         let bridges = [
-            (Signal::FrictionTorque, shifted(time_s, &torque_nm, -late_s), of_sample * log.friction_noise_nm),
+            (
+                Signal::FrictionTorque,
+                above(shifted(time_s, &torque_nm, -1e-3 * late_ms), friction_zero_nm),
+                of_sample * log.friction_noise_nm,
+            ),
             (
                 Signal::NormalForce,
-                shifted(time_s, &inputs.normal_force_n, behind_s),
+                above(shifted(time_s, &inputs.normal_force_n, behind_s), normal_zero_n),
                 of_sample * log.normal_noise_n,
             ),
         ];

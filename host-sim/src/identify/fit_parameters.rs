@@ -9,6 +9,7 @@ use super::contact::baseline;
 use super::contact::problem::{BaseParameter, Baseline, Role};
 use super::term::Parameter;
 use crate::files::model_file::{ModelFile, ModelKind};
+use crate::files::rig_file::RigFile;
 use crate::fit::error::FitError;
 use crate::input_error::InputError;
 
@@ -54,11 +55,11 @@ fn role(name: &str, block: bool) -> Option<(Role, f64)> {
     }
 }
 
-/// The baseline in which `free` is identified; the lateness of the channel is found beside it, its last parameter.
+/// The baseline in which `free` is identified; the errors of the sensors are found beside it, its last parameters.
 ///
 /// # Errors
 /// A name that the model does not have, and one that the contact's balance does not show.
-pub fn baseline_of(model: &ModelFile, free: &[String]) -> Result<Baseline, InputError> {
+pub fn baseline_of(model: &ModelFile, rig: &RigFile, free: &[String]) -> Result<Baseline, InputError> {
     let refuse = |problem: String| InputError::new(problem).file(model.source.as_str());
     if let Some(name) = free.iter().find(|name| model.get(name).is_none()) {
         let names: Vec<&str> = model.parameters().map(|(name, _)| name).collect();
@@ -72,7 +73,7 @@ pub fn baseline_of(model: &ModelFile, free: &[String]) -> Result<Baseline, Input
     if !hidden.is_empty() {
         return Err(refuse(FitError::NoInfluence { names: hidden }.to_string()));
     }
-    let Baseline { mut numbers, free: mut usual } = baseline::baseline(model, WITHIN);
+    let Baseline { mut numbers, free: mut usual } = baseline::baseline(model, WITHIN).with_bridge_zeros(rig);
     let wanted = |role: Role| free.iter().any(|name| self::role(name, block).is_some_and(|(r, _)| r == role));
     for (slot, role, some) in [
         (&mut numbers.a2_s_per_m, Role::A2, SOME_VISCOUS_S_PER_M),
@@ -83,7 +84,7 @@ pub fn baseline_of(model: &ModelFile, free: &[String]) -> Result<Baseline, Input
             *slot = some;
         }
     }
-    usual.retain(|base| base.role == Role::Late);
+    usual.retain(|base| base.role.is_of_sensor());
     let mut parameters = Vec::new();
     for name in free {
         let Some((role, sd)) = role(name, block) else { continue };

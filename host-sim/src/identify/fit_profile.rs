@@ -247,12 +247,13 @@ mod tests {
     use super::super::fit_parameters::{baseline_of, values};
     use super::*;
     use crate::files::model_file::ModelFile;
+    use crate::files::rig_file::RigFile;
 
     #[test]
     fn a_straight_problem_keeps_its_covariance_and_a_bent_one_gets_a_tail() {
         let model = ModelFile::assumed(&[]).unwrap();
         let free: Vec<String> = ["a0", "a1", "v0_m_s"].map(String::from).to_vec();
-        let baseline = baseline_of(&model, &free).unwrap();
+        let baseline = baseline_of(&model, &RigFile::assumed_rig(&[]).unwrap(), &free).unwrap();
         let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
         let slid = || (1..1000).map(|i| 1e-3 * f64::from(i)).collect::<Vec<f64>>();
         // Where the likelihood is quadratic, carried back to the parameters.

@@ -9,13 +9,14 @@
 //! Plain least squares (Levenberg–Marquardt in Moré's form, crate `levenberg-marquardt`) and no weights: the steps are few
 //! samples with large errors, which a robust likelihood would take for outliers.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::contact::problem::{Baseline, Role};
+use super::contact::problem::{Baseline, Numbers, Role};
 use super::filters::{gaussian, rms};
 use super::fit_parameters::{set_all, values};
 use crate::files::log::Log;
@@ -115,12 +116,16 @@ impl<'a> Simulated<'a> {
         let mut model = self.model.clone();
         model.extensions.clear();
         set_all(&mut model, self.free, &values(self.model, self.baseline, p, self.free)).ok()?;
-        let late = self.baseline.free.iter().position(|base| base.role == Role::Late);
-        let late_s = late.map_or(0.0, |at| 1e-3 * self.baseline.bounded(p, at));
+        let Numbers { late_ms, friction_zero_nm, normal_zero_n, .. } = self.baseline.numbers(p);
         let each = self.runs.par_iter().map(|run| {
-            let torque = simulate_planned(&model, self.rig, &run.inputs, &run.plan).ok()?;
-            let shown = shifted(&run.inputs.time_s, &torque, -late_s);
-            let residual: Vec<f64> = run.measured_nm.iter().zip(&shown).map(|(y, x)| y - x).collect();
+            let mut inputs = Cow::Borrowed(&run.inputs);
+            if normal_zero_n != 0.0 {
+                inputs.to_mut().normal_force_n.iter_mut().for_each(|load| *load -= normal_zero_n);
+            }
+            let torque = simulate_planned(&model, self.rig, &inputs, &run.plan).ok()?;
+            let shown = shifted(&run.inputs.time_s, &torque, -1e-3 * late_ms);
+            let off = |(y, x): (&f64, &f64)| y - x - friction_zero_nm;
+            let residual: Vec<f64> = run.measured_nm.iter().zip(&shown).map(off).collect();
             Some(smoothed(&residual, width_s / run.step_s))
         });
         let residual = DVector::from_vec(each.collect::<Option<Vec<_>>>()?.concat());

@@ -64,6 +64,13 @@ pub enum Role {
     NormalZero,
 }
 
+impl Role {
+    /// Whether it is an error of a sensor, and no number of the contact.
+    pub fn is_of_sensor(self) -> bool {
+        matches!(self, Self::Late | Self::FrictionZero | Self::NormalZero)
+    }
+}
+
 /// Numbers of the contact before anything is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbers {
