@@ -204,7 +204,7 @@ impl Judgement {
 
     /// A part's place in the answer.
     pub fn place(&self, part: Part) -> Option<usize> {
-        self.best().places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place)
+        self.best().place(part)
     }
 
     /// The probability that what a hypothesis leaves is something unknown is that of all hypotheses, each with its own.
@@ -246,10 +246,8 @@ impl Judgement {
     /// Whether the hypothesis at a place predicts what the answer does, to the form of that one's cause at `own`.
     fn alike(&self, own: usize, at: usize) -> bool {
         let (best, other) = (self.best(), &self.hypotheses[at]);
-        let place =
-            |h: &Hypothesis, part: Part| h.places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place);
         let apart = |part: Part| -> Option<f64> {
-            let [a, b] = [place(best, part)?, place(other, part)?];
+            let (a, b) = (best.place(part)?, other.place(part)?);
             Some(match part {
                 Part::Friction => self.contact.as_ref()?.apart(a, b),
                 Part::Drive => self.drive.as_ref()?.apart(a, b),
@@ -262,14 +260,13 @@ impl Judgement {
     }
 
     fn rests_of(&self, hypothesis: &Hypothesis) -> Rests {
-        let place = |part: Part| hypothesis.places.iter().find(|(p, _)| *p == part).map(|(_, place)| *place);
         let mut out = Vec::new();
-        if let (Some(contact), Some(place)) = (&self.contact, place(Part::Friction)) {
+        if let (Some(contact), Some(place)) = (&self.contact, hypothesis.place(Part::Friction)) {
             let disc_cause = contact.disc_cause.as_ref().filter(|c| hypothesis.effects.contains(&c.effect));
             out.push((Part::Friction, rest::of_contact(contact, place, disc_cause)));
         }
         for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.normal_load)] {
-            if let (Some(linear), Some(place)) = (linear, place(part)) {
+            if let (Some(linear), Some(place)) = (linear, hypothesis.place(part)) {
                 out.push((part, linear.rest(place)));
             }
         }

@@ -89,15 +89,21 @@ impl Contribution {
         self.size > self.known
     }
 
-    /// Its size over what could be the form of the model or the class of a bridge, or the form of a larger cause beside it that is wrong by `beside`. One that
-    /// leaves more than it explains has the wrong shape, and is so much more likely a form; up to where nothing is. One that
-    /// explains all that the larger cause leaves has a shape of its own, and is so much less likely that cause's form.
+    /// Its size over what could be the form of the model or the class of a bridge, or the form of a larger cause beside it that is
+    /// wrong by `beside`. One that leaves more than it explains has the wrong shape, and is so much more likely a form; up to where
+    /// nothing is. One that explains all that the larger cause leaves has a shape of its own, and is so much less likely that
+    /// cause's form.
     pub fn over_form(&self, beside: f64) -> f64 {
         let leaves = self.over_rest.recip();
         let of_model = self.known * leaves.clamp(1.0, BEYOND_FORM);
         let of_other = beside * leaves.clamp(BEYOND_FORM.recip(), BEYOND_FORM);
         self.size / of_model.max(of_other)
     }
+}
+
+/// What a size is known to that a bridge makes too, whose zero has this deviation relative to what it usually shows.
+fn beyond_class(class: f64) -> f64 {
+    class.max(MODEL_FORM)
 }
 
 /// Noise of samples.
@@ -217,8 +223,8 @@ impl Ground {
     pub fn contributions(&self, problem: &Problem<'_>, fit: &Fit, without: &[Fit]) -> Vec<Contribution> {
         let known = fit.terms.iter().map(|term| match problem.terms[*term].error_of {
             None => MODEL_FORM,
-            Some(Bridge::Friction) => self.classes[0].max(MODEL_FORM),
-            Some(Bridge::Normal) => self.classes[1].max(MODEL_FORM),
+            Some(Bridge::Friction) => beyond_class(self.classes[0]),
+            Some(Bridge::Normal) => beyond_class(self.classes[1]),
         });
         let white = Noise::white(self.noise.white.clone());
         let rest = |fit: &Fit| self.beyond(&white, &self.left(problem, fit)).0.sqrt();
@@ -361,7 +367,7 @@ pub fn contribution(balance: &Balance, effect: &str, residual: &[f64], without: 
     Contribution {
         size: change / scale,
         over_rest: change / (LEFT_SHARE * left),
-        known: if of_bridge { (balance.bridge_zero / scale).max(MODEL_FORM) } else { MODEL_FORM },
+        known: if of_bridge { beyond_class(balance.bridge_zero / scale) } else { MODEL_FORM },
     }
 }
 
@@ -394,6 +400,15 @@ mod tests {
     use super::*;
     use crate::identify::balance::LogRows;
 
+    const ROWS: usize = 2000;
+
+    /// A balance without a base whose response is everywhere the same, of efforts of this size.
+    fn balance(response: f64, scale: f64) -> Balance {
+        let left_out = vec![false; ROWS];
+        let rows = LogRows { width: 1.0, step_s: 1e-3, left_out, noise: Box::new(|_| vec![0.01]) };
+        Balance::new(vec![response; ROWS], Vec::new(), &[rows], scale)
+    }
+
     #[test]
     fn what_repeats_itself_stays_in_a_mean_and_what_is_new_does_not() {
         let rows: Vec<usize> = (0..100).collect();
@@ -417,30 +432,16 @@ mod tests {
 
     #[test]
     fn a_cause_is_as_large_as_it_is_to_the_torques_of_whose_difference_it_is_a_part() {
-        const ROWS: usize = 2000;
-        let log = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![0.01]),
-        };
         // The difference of two torques of 4 N m, which is nothing but an offset of 0.01 N m.
-        let balance = Balance::new(vec![0.01; ROWS], Vec::new(), &[log], 4.0);
+        let balance = balance(0.01, 4.0);
         let size = contribution(&balance, "", &[0.0; ROWS], &[0.01; ROWS]).size;
         assert!((size - 0.0025).abs() < 1e-12 && size < MODEL_FORM, "{size}");
     }
 
     #[test]
     fn an_error_of_a_bridge_is_told_where_it_is_beyond_its_class() {
-        const ROWS: usize = 2000;
-        let log = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![0.01]),
-        };
         // Torques of 2 N m beside a bridge of 8 N m whose zero is known to 0.016.
-        let balance = Balance::new(vec![0.0; ROWS], Vec::new(), &[log], 2.0).with_sensors(0, 0.016);
+        let balance = balance(0.0, 2.0).with_sensors(0, 0.016);
         let told = |effect: &str, size_nm: f64| {
             contribution(&balance, effect, &[0.0; ROWS], &[size_nm; ROWS]).is_told()
         };

@@ -96,6 +96,11 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
+    /// Place of its candidate in a part's own list.
+    pub fn place(&self, part: Part) -> Option<usize> {
+        self.places.iter().find(|(own, _)| *own == part).map(|(_, place)| *place)
+    }
+
     /// Place of the cause in whose place the other hypothesis has another one, where that is all that they differ in.
     pub fn in_place_of(&self, other: &Self) -> Option<usize> {
         let own = |effect: &&&'static str| !other.effects.contains(effect);

@@ -137,20 +137,11 @@ impl Baseline {
                     numbers.a1 *= value.exp();
                     continue;
                 }
-                Role::Late => {
-                    numbers.late_ms = value;
-                    continue;
-                }
-                Role::FrictionZero => {
-                    numbers.friction_zero_nm = value;
-                    continue;
-                }
-                Role::NormalZero => {
-                    numbers.normal_zero_n = value;
-                    continue;
-                }
+                Role::Late => &mut numbers.late_ms,
+                Role::FrictionZero => &mut numbers.friction_zero_nm,
+                Role::NormalZero => &mut numbers.normal_zero_n,
             };
-            *slot = value.exp();
+            *slot = if base.role.is_of_sensor() { value } else { value.exp() };
         }
         numbers
     }

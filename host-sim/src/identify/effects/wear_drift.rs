@@ -10,6 +10,7 @@ use super::coordinates::saturating;
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
 use crate::identify::contact::problem::Numbers;
+use crate::identify::contact_part::ContactPart;
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
@@ -17,6 +18,13 @@ pub(super) struct WearDrift;
 
 /// Bends of the law over distance, in shares of the longest.
 const BENDS: [f64; 4] = [0.02, 0.06, 0.2, 1.0];
+
+/// Names of the forms in which each log begins with a fresh track.
+const SWEPT: &str = "";
+const LAW: &str = "law";
+/// And of those in which it begins with the wear of the logs before it.
+const KEPT: &str = "from log to log";
+const KEPT_LAW: &str = "law from log to log";
 
 impl Effect for WearDrift {
     fn about(&self) -> About {
@@ -42,14 +50,17 @@ impl Effect for WearDrift {
         };
         let of_all: Vec<Vec<f64>> = of_logs.iter().map(&mut follow).collect();
         let swept = self.over(of_logs, s.distance_m, [SWEPT, LAW], 0.0);
-        let kept = self.over(of_all, s.slid_m, ["from log to log", "law from log to log"], s.slid_m);
+        let kept = self.over(of_all, s.slid_m, [KEPT, KEPT_LAW], s.slid_m);
         swept.into_iter().chain(kept).collect()
     }
-}
 
-/// Names of the forms in which each log begins with a fresh track.
-const SWEPT: &str = "";
-const LAW: &str = "law";
+    fn remark(&self, contact: &ContactPart, place: usize) -> Option<String> {
+        let mut forms = contact.fit(place).terms.iter().map(|term| &contact.terms[*term]);
+        let own = forms.find(|term| term.effect == self.id())?;
+        let kept = [KEPT, KEPT_LAW].contains(&own.form);
+        kept.then(|| "it goes on from log to log, and the law is that of a run after those fitted".into())
+    }
+}
 
 impl WearDrift {
     /// Columns and law over a distance whose largest value is this, m; so much has been slid when a run begins that is yet to
@@ -116,7 +127,7 @@ mod tests {
         let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, scales)).collect();
         let view =
             ContactView { logs, coordinates: &coordinates, scales, training, train_count: 2, block: true };
-        WearDrift.contact(&view).into_iter().find(|term| term.form == "law from log to log").unwrap()
+        WearDrift.contact(&view).into_iter().find(|term| term.form == KEPT_LAW).unwrap()
     }
 
     #[test]
