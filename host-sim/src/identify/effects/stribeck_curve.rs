@@ -8,9 +8,9 @@ use super::{DriveLog, DriveView};
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
 
-/// Widths, in shares of the usual speed: from standstill to half of it, a factor of two apart. What falls at the usual speed
-/// itself is no friction near zero, but a controller that gives less torque the faster it turns.
-const SHARES: [f64; 7] = [0.0078, 0.0156, 0.0312, 0.0625, 0.125, 0.25, 0.5];
+/// Widths, in shares of the usual speed: from standstill to all of it, a factor of two apart. What falls beyond it is no
+/// friction near zero, but a controller that gives less torque the faster it turns.
+const SHARES: [f64; 8] = [0.0078, 0.0156, 0.0312, 0.0625, 0.125, 0.25, 0.5, 1.0];
 /// What the names of a width and of its excess begin with.
 const SPEED: &str = "stribeck_speed";
 const EXCESS: &str = "static_excess";
@@ -78,8 +78,8 @@ mod tests {
         let laws: [fn(f64) -> f64; 4] =
             [|x| (-x).exp(), |x| (-x * x).exp(), |x| 1.0 / (1.0 + x * x), |x| (-x.sqrt()).exp()];
         let speeds: Vec<f64> = (1..200).map(|i| 0.01 * f64::from(i)).collect();
-        // Falling over a tenth to a half of the usual speed; beside Coulomb's and viscous friction.
-        for (law, at) in laws.iter().flat_map(|law| [0.1, 0.23, 0.5].map(|at| (law, at))) {
+        // Falling over a tenth of the usual speed to all of it; beside Coulomb's and viscous friction.
+        for (law, at) in laws.iter().flat_map(|law| [0.1, 0.23, 0.5, 1.0].map(|at| (law, at))) {
             let base = |v: &f64| [1.0, -1.0, *v, -*v];
             let widths = |v: &f64| SHARES.map(|share| (-(v / share).powi(2)).exp());
             let rows: Vec<f64> = speeds.iter().flat_map(|v| base(v).into_iter().chain(widths(v))).collect();
