@@ -11,8 +11,13 @@ use nalgebra::{DMatrix, DVector};
 /// Number of blocks.
 pub const BLOCKS: usize = 40;
 
-/// Covariance of the parameters; `None` where JᵀJ cannot be inverted.
-pub fn sandwich(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Option<DMatrix<f64>> {
+/// Covariance of the parameters; `None` where JᵀJ cannot be inverted. `slow` is the covariance that noise slower than a block
+/// gives Jᵀr, where it is known.
+pub fn sandwich(
+    jacobian: &DMatrix<f64>,
+    residual: &DVector<f64>,
+    slow: Option<&DMatrix<f64>>,
+) -> Option<DMatrix<f64>> {
     let (samples, parameters) = jacobian.shape();
     let blocks = BLOCKS.min(samples / 2).max(1);
     if samples <= parameters || blocks <= parameters {
@@ -33,6 +38,9 @@ pub fn sandwich(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Option<DMat
     }
     // Fitting p parameters removes p of the blocks' degrees of freedom.
     spread *= blocks as f64 / (blocks - parameters) as f64;
+    if let Some(slow) = slow {
+        spread += DMatrix::from_fn(parameters, parameters, |i, j| slow[(i, j)] / (norms[i] * norms[j]));
+    }
     let covariance = &inverse * spread * &inverse;
     Some(DMatrix::from_fn(parameters, parameters, |i, j| covariance[(i, j)] / (norms[i] * norms[j])))
 }
@@ -67,7 +75,7 @@ mod tests {
     fn white_noise_gives_the_classical_standard_deviation() {
         let samples = 4000;
         let jacobian = DMatrix::from_element(samples, 1, 1.0);
-        let covariance = sandwich(&jacobian, &DVector::from_vec(noise(samples, 3))).unwrap();
+        let covariance = sandwich(&jacobian, &DVector::from_vec(noise(samples, 3)), None).unwrap();
         // A variance from 40 blocks has a relative standard deviation of √(2/40) = 22 %; three of them.
         let ratio = covariance[(0, 0)] * samples as f64;
         assert!((ratio - 1.0).abs() < 0.66, "{ratio}");
@@ -86,7 +94,7 @@ mod tests {
             })
             .collect();
         let jacobian = DMatrix::from_element(samples, 1, 1.0);
-        let covariance = sandwich(&jacobian, &DVector::from_vec(red)).unwrap();
+        let covariance = sandwich(&jacobian, &DVector::from_vec(red), None).unwrap();
         // Variance of the mean of an AR(1) process: σ²/(1 − 0.9)²/n = 100/n.
         let ratio = covariance[(0, 0)] * samples as f64 / 100.0;
         assert!((0.4..1.7).contains(&ratio), "{ratio}");

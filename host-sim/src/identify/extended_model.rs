@@ -9,7 +9,6 @@ use model_core::extension::Extension as CoreExtension;
 use nalgebra::DMatrix;
 
 use super::contact::baseline::has_block;
-use super::contact::log::ContactLog;
 use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
 use super::contact_part::ContactPart;
@@ -170,9 +169,9 @@ impl FittedLaws {
     /// With the covariance from blocks of the residuals: what strikes a few load steps is known by those few.
     fn new(problem: &Problem<'_>, fit: Fit) -> Self {
         let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
-        let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
         let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
-        let covariance = fit_interval::covariance(&columns, &fit.r, &lengths, &prior_sd);
+        let residuals = fit_interval::Residuals::new(problem, &fit);
+        let covariance = fit_interval::covariance(&columns, &residuals, &prior_sd);
         Self { fit, columns, covariance }
     }
 }

@@ -14,14 +14,14 @@ use super::contact::log::{ContactLog, OBSERVED_OVER};
 use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
 use super::filters::rms;
 use super::fit_bias::Resimulated;
-use super::fit_interval::covariance;
+use super::fit_interval::{Residuals, covariance};
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_profile::{Form, Known, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
 use crate::files::rig_file::RigFile;
-use crate::fit::covariance::{INTERVAL_95, correlations, sandwich};
+use crate::fit::covariance::{INTERVAL_95, correlations};
 use crate::fit::error::FitError;
 use crate::fit::identifiability::{Identifiability, examine};
 use crate::input_error::InputError;
@@ -204,17 +204,18 @@ pub fn identify(
     }
     let singular_ratio = examined(&problem, &fit.p).map_err(refuse)?;
 
-    let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let columns = problem.jacobian(&[], &fit.p, &fit.r);
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
-    let mut of_p = covariance(&columns, &fit.r, &lengths, &alone);
-    let mut under_prior = covariance(&columns, &fit.r, &lengths, &prior_sd);
+    let (mut of_p, mut under_prior) = {
+        let residuals = Residuals::new(&problem, &fit);
+        (covariance(&columns, &residuals, &alone), covariance(&columns, &residuals, &prior_sd))
+    };
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);
     let left = smoothed_rms(&left.collect::<Vec<_>>(), logs[0].grid.step_s);
     let simulated = Simulated::new(model, rig, &baseline, free, raw, (&found, left))?.fit(&found, progress);
-    let simulated = simulated.and_then(|fit| Some((sandwich(&fit.jacobian, &fit.residual_nm)?, fit.p)));
+    let simulated = simulated.and_then(|fit| Some((fit.covariance()?, fit.p)));
     let by_simulation = simulated.is_some();
     if let Some((covariance, p)) = simulated {
         (fit.p, found) = (p.clone(), p);

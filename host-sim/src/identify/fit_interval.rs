@@ -3,13 +3,16 @@
 //! cov p = H⁻¹ S H⁻¹ (Huber 1967, White 1980) with H = Σ ψ′(r_t) j_t j_tᵀ, S = Σ_b s_b s_bᵀ and s_b = Σ_{t∈b} j_t ψ(r_t)
 //! summed over a block of neighbouring samples, as [`crate::fit::covariance`] does for least squares; ψ is the slope of
 //! Student's likelihood. The blocks see whatever noise of the inputs, error between samples or of the model's form is
-//! left in the residuals and is correlated over less than a block. The prior takes part in H alone, so that a number
+//! left in the residuals and is correlated over less than a block; S has that of noise that is slower besides
+//! ([`super::slow_noise`]). The prior takes part in H alone, so that a number
 //! that the logs do not determine is as uncertain as the prior and no less.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::contact::problem::FREEDOM;
+use super::contact::log::ContactLog;
+use super::contact::problem::{FREEDOM, Fit, Problem};
 use super::linear;
+use super::slow_noise::Errors;
 use crate::fit::covariance::BLOCKS;
 
 /// Blocks of nearly equal length, none across two logs; `lengths` are those of the logs.
@@ -25,13 +28,34 @@ fn blocks(lengths: &[usize]) -> Vec<std::ops::Range<usize>> {
     blocks
 }
 
-/// Covariance of parameters whose prior is `prior_sd`, from the columns −∂r/∂p and the residuals over their deviations.
-pub(super) fn covariance(
-    columns: &[Vec<f64>],
-    r: &[f64],
-    lengths: &[usize],
-    prior_sd: &[f64],
-) -> DMatrix<f64> {
+/// Residuals of a contact's logs on end.
+pub(super) struct Residuals<'a> {
+    /// Over their deviations; 0 where a sample takes no part.
+    r: &'a [f64],
+    /// The deviations, N m.
+    deviation_nm: &'a [f64],
+    /// Whether the tip slides.
+    slides: Vec<bool>,
+    /// Samples of each log.
+    lengths: Vec<usize>,
+}
+
+impl<'a> Residuals<'a> {
+    /// Those of a fit.
+    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit) -> Self {
+        let observed = problem.predict(&fit.terms, &fit.p).observed;
+        Self {
+            r: &fit.r,
+            deviation_nm: &problem.noise.deviation,
+            slides: observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect(),
+            lengths: problem.logs.iter().map(ContactLog::len).collect(),
+        }
+    }
+}
+
+/// Covariance of parameters whose prior is `prior_sd`, from the columns −∂r/∂p.
+pub(super) fn covariance(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f64]) -> DMatrix<f64> {
+    let Residuals { r, deviation_nm, slides, lengths } = of;
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let slope: Vec<f64> = r
@@ -45,7 +69,15 @@ pub(super) fn covariance(
         columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
     let (mut h, _) = linear::normal_equations(&scaled, &slope, r);
     let blocks = blocks(lengths);
-    let mut spread = DMatrix::identity(n, n);
+    let residual = r.iter().zip(*deviation_nm).zip(slides);
+    let residual: Vec<f64> = residual.map(|((r, sd), slides)| if *slides { r * sd } else { 0.0 }).collect();
+    let gradient = |c: &Vec<f64>| {
+        c.iter().zip(&slope).zip(*deviation_nm).map(|((c, slope), sd)| c * slope / sd).collect()
+    };
+    let gradients: Vec<Vec<f64>> = scaled.iter().map(gradient).collect();
+    let errors = Errors { residual: &residual, deviation: deviation_nm, lengths };
+    let mut spread = DMatrix::identity(n, n)
+        + errors.spread_of_slow_noise(&gradients, r.len() as f64 / blocks.len().max(1) as f64);
     let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
     for block in blocks {
         let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
@@ -117,10 +149,17 @@ mod tests {
         assert!(slow < 2.0 && counts > 20.0, "{slow} {counts}");
     }
 
+    /// Of residuals of deviation 1 in one log that slides throughout.
+    fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> DMatrix<f64> {
+        let deviation_nm = vec![1.0; r.len()];
+        let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
+        covariance(columns, &Residuals { r, deviation_nm: &deviation_nm, slides, lengths }, prior_sd)
+    }
+
     #[test]
     fn the_mean_of_white_noise_has_its_own_deviation() {
         let n = 8000;
-        let c = covariance(&[vec![1.0; n]], &noise(n, 3), &[n], &[1.0]);
+        let c = of(&[vec![1.0; n]], &noise(n, 3), &[1.0]);
         // Forty blocks know a variance within 22 %, one deviation; Student's weights cost 1/0.93 on normal noise.
         let ratio = c[(0, 0)] * n as f64;
         assert!((0.5..1.8).contains(&ratio), "{ratio}");
@@ -129,7 +168,7 @@ mod tests {
     #[test]
     fn what_changes_nothing_is_as_uncertain_as_its_prior() {
         let n = 2000;
-        let c = covariance(&[vec![1.0; n], vec![0.0; n]], &noise(n, 5), &[n], &[1.0, 0.7]);
+        let c = of(&[vec![1.0; n], vec![0.0; n]], &noise(n, 5), &[1.0, 0.7]);
         assert!((c[(1, 1)].sqrt() - 0.7).abs() < 1e-9, "{c}");
     }
 }

@@ -19,9 +19,11 @@ use rayon::prelude::*;
 use super::contact::problem::{Baseline, Numbers, Role};
 use super::filters::{gaussian, rms};
 use super::fit_parameters::{set_all, values};
+use super::slow_noise::Errors;
 use crate::files::log::Log;
 use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::RigFile;
+use crate::fit::covariance::{BLOCKS, sandwich};
 use crate::input_error::InputError;
 use crate::least_squares::Problem;
 use crate::predict::curve::shifted;
@@ -67,9 +69,25 @@ pub(super) struct SimulatedFit {
     /// Values of the baseline.
     pub(super) p: Vec<f64>,
     /// Measured less simulated, all logs on end, N m.
-    pub(super) residual_nm: DVector<f64>,
+    residual_nm: DVector<f64>,
     /// Its slopes over the values.
-    pub(super) jacobian: DMatrix<f64>,
+    jacobian: DMatrix<f64>,
+    /// Samples of each log.
+    lengths: Vec<usize>,
+}
+
+impl SimulatedFit {
+    /// Covariance of the values; `None` where the logs do not tell them apart.
+    pub(super) fn covariance(&self) -> Option<DMatrix<f64>> {
+        let residual = self.residual_nm.as_slice();
+        let deviation = vec![rms(residual); residual.len()];
+        let columns: Vec<Vec<f64>> =
+            self.jacobian.column_iter().map(|c| c.iter().copied().collect()).collect();
+        let block = residual.len() as f64 / BLOCKS as f64;
+        let slow = Errors { residual, deviation: &deviation, lengths: &self.lengths }
+            .spread_of_slow_noise(&columns, block);
+        sandwich(&self.jacobian, &self.residual_nm, Some(&slow))
+    }
 }
 
 /// Over a Gaussian of so many samples; one narrower than a sample leaves them as they are.
@@ -169,7 +187,8 @@ impl<'a> Simulated<'a> {
         }
         let residual_nm = self.residual_nm(&p, finest)?;
         let jacobian = self.jacobian(&p, &residual_nm, finest)?;
-        Some(SimulatedFit { p, residual_nm, jacobian })
+        let lengths = self.runs.iter().map(|run| run.measured_nm.len()).collect();
+        Some(SimulatedFit { p, residual_nm, jacobian, lengths })
     }
 
     /// The values `from`, with other dampings where the model has one.

@@ -30,6 +30,7 @@ pub mod page;
 pub mod rest;
 pub mod results;
 mod same_amplitude;
+mod slow_noise;
 pub mod spectrum;
 pub mod table;
 pub mod term;

@@ -244,7 +244,7 @@ pub fn identify(records: &[DriveRecord], friction: Friction, motion: Motion) -> 
         .map_err(|why| FitError::NotConverged(why.to_string()))?;
     let predicted = &jacobian * &solution;
     let residual = &effort - &predicted;
-    let (std, correlations) = match covariance::sandwich(&jacobian, &residual) {
+    let (std, correlations) = match covariance::sandwich(&jacobian, &residual, None) {
         Some(covariance) => {
             let std = covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();
             (std, covariance::correlations(&covariance))

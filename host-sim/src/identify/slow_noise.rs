@@ -1,0 +1,173 @@
+//! What noise slower than a block of [`super::fit_interval`] does to what is fitted: 1/f noise, which strain gauges'
+//! amplifiers have and which a record of some ten seconds takes for friction of another speed.
+//!
+//! Its level is the flat part of the residuals' Allan variance (IEEE Std 952, bias instability), of which white noise makes
+//! a part that falls with the length m of the means: σ²(m) = A/m + B. First-order processes of equal variance a decade apart
+//! have a power B/(2 ln 2)/f (van der Ziel 1950): those as long as a block and ten times as long are what its sums do not
+//! show. What is longer is a zero of the bridge, which has a prior.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::filters::median_magnitude;
+use super::linear;
+
+/// Deviation of a normal distribution over the median of its sizes.
+const NORMAL: f64 = 1.4826;
+/// Variance of a variance from so many differences, times their number, over its square: 2 of normal ones, of which their
+/// median takes 37 % as much notice.
+const VARIANCE_OF_VARIANCE: f64 = 2.0 / 0.37;
+/// Shortest means, samples: shorter ones show the filters of sensors and what swings.
+const SHORTEST: usize = 16;
+/// Longest ones, as a part of the shortest log: means of more than it are few, and what is fitted has taken of them.
+const LONGEST: usize = 4;
+/// Time constants over the length of a block.
+const BLOCKS_LONG: [f64; 2] = [1.0, 10.0];
+
+/// What the errors of a fit are, all logs on end.
+pub(super) struct Errors<'a> {
+    /// Residuals; 0 where a sample takes no part, or does not show what is slow: where a tip sticks, its slip is observed from
+    /// the force, slow noise and all.
+    pub(super) residual: &'a [f64],
+    /// Deviation of each.
+    pub(super) deviation: &'a [f64],
+    /// Samples of each log.
+    pub(super) lengths: &'a [usize],
+}
+
+impl Errors<'_> {
+    /// Allan variance of means over so many samples, half the squared difference of neighbours: that of white noise with the
+    /// deviations, that of the residuals, and the number of differences.
+    fn allan(&self, samples: usize) -> (f64, f64, usize) {
+        let (mut white, mut differences, mut from) = (Vec::new(), Vec::new(), 0);
+        for &length in self.lengths {
+            let mean = |at: usize| {
+                let (mut weight, mut sum, mut used) = (0.0, 0.0, 0);
+                for i in at..at + samples {
+                    if self.residual[i] != 0.0 {
+                        let w = self.deviation[i].powi(-2);
+                        (weight, sum, used) = (weight + w, sum + w * self.residual[i], used + 1);
+                    }
+                }
+                (2 * used > samples).then(|| (weight.recip(), sum / weight))
+            };
+            let means: Vec<_> = (0..length / samples).map(|k| mean(from + k * samples)).collect();
+            from += length;
+            for pair in means.windows(2) {
+                if let [Some(a), Some(b)] = pair {
+                    white.push(0.5 * (a.0 + b.0));
+                    differences.push(a.1 - b.1);
+                }
+            }
+        }
+        let count = differences.len();
+        let size = NORMAL * median_magnitude(differences.into_iter());
+        (median_magnitude(white.into_iter()), 0.5 * size * size, count)
+    }
+
+    /// Variance of the first-order process of a decade.
+    fn of_decade(&self) -> f64 {
+        let longest = self.lengths.iter().copied().min().unwrap_or(0) / LONGEST;
+        let octaves = std::iter::successors(Some(SHORTEST), |m| Some(2 * m)).take_while(|m| *m <= longest);
+        let (mut h, mut g) = (DMatrix::zeros(2, 2), DVector::zeros(2));
+        for (white, found, count) in octaves.map(|m| self.allan(m)).filter(|(_, found, _)| *found > 0.0) {
+            // Relative to what is found: a variance is known to a share of it, the better the more there are.
+            let row = DVector::from_vec(vec![white, 1.0]) / found;
+            h += count as f64 * &row * row.transpose();
+            g += count as f64 * row;
+        }
+        // What is less than its own deviation is not seen: white noise in few long means looks like it in every other record.
+        let seen = linear::factor(&h).inverse()[(1, 1)] * VARIANCE_OF_VARIANCE;
+        let level = (linear::non_negative(&h, &g)[1] - seen.sqrt()).max(0.0);
+        level * std::f64::consts::LN_10 / (2.0 * std::f64::consts::LN_2)
+    }
+
+    /// Covariance of the score Σ g_t e_t that slow noise e makes, for the gradients g of each parameter; a block has so many
+    /// samples.
+    pub(super) fn spread_of_slow_noise(&self, gradients: &[Vec<f64>], block: f64) -> DMatrix<f64> {
+        let n = gradients.len();
+        let mut spread = DMatrix::zeros(n, n);
+        for kept in BLOCKS_LONG.map(|long| (-1.0 / (long * block)).exp()) {
+            let mut from = 0;
+            for &length in self.lengths {
+                // Σ_s Σ_t g_s g_tᵀ kept^|s−t|, the past of each sample in a state.
+                let mut past = DVector::zeros(n);
+                for i in from..from + length {
+                    let shows = f64::from(u8::from(self.residual[i] != 0.0));
+                    let now = DVector::from_fn(n, |k, _| shows * gradients[k][i]);
+                    past *= kept;
+                    let across = &now * past.transpose();
+                    spread += &now * now.transpose() + across.transpose() + across;
+                    past += now;
+                }
+                from += length;
+            }
+        }
+        spread * self.of_decade()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::noise::White;
+
+    const LENGTHS: [usize; 2] = [8000, 12_000];
+    const BLOCK: f64 = 500.0;
+
+    /// White noise of deviation 1, and first-order processes of this deviation a decade apart, shorter than a sample to
+    /// longer than a log.
+    fn residual(of_each: f64, white: &mut White) -> Vec<f64> {
+        let mut all = Vec::new();
+        for length in LENGTHS {
+            let constants = [5.0, 50.0, 500.0, 5000.0];
+            let mut states = constants.map(|_| white.next());
+            for _ in 0..length {
+                for (state, constant) in states.iter_mut().zip(constants) {
+                    let kept = f64::exp(-1.0 / constant);
+                    *state = kept * *state + (1.0 - kept * kept).sqrt() * white.next();
+                }
+                all.push(white.next() + of_each * states.iter().sum::<f64>());
+            }
+        }
+        all
+    }
+
+    fn errors<'a>(residual: &'a [f64], deviation: &'a [f64]) -> Errors<'a> {
+        Errors { residual, deviation, lengths: &LENGTHS }
+    }
+
+    #[test]
+    fn the_level_is_that_of_the_noise() {
+        let ones = vec![1.0; 20_000];
+        let mut white = White::new(3);
+        for of_each in [0.1, 0.3] {
+            let mean =
+                (0..8).map(|_| errors(&residual(of_each, &mut white), &ones).of_decade()).sum::<f64>() / 8.0;
+            let ratio = mean / (of_each * of_each);
+            assert!((0.5..1.5).contains(&ratio), "{of_each}: {ratio}");
+        }
+        // White noise alone mostly shows none: less than what a block leaves of it.
+        let mean = (0..8).map(|_| errors(&residual(0.0, &mut white), &ones).of_decade()).sum::<f64>() / 8.0;
+        assert!(mean < 0.1 / BLOCK, "{mean}");
+    }
+
+    #[test]
+    fn a_number_that_slow_noise_moves_is_as_uncertain_as_that() {
+        // A number that shows in turn, two and a half blocks long: the slow processes do not cancel in it.
+        let gradient: Vec<f64> = (0..20_000).map(|i| if i / 1250 % 2 == 0 { 1.0 } else { -0.5 }).collect();
+        let norm: f64 = gradient.iter().map(|g| g * g).sum();
+        let ones = vec![1.0; 20_000];
+        let mut white = White::new(5);
+        let (mut found, mut stated) = (0.0, 0.0);
+        const TRIALS: u32 = 60;
+        for _ in 0..TRIALS {
+            let r = residual(0.3, &mut white);
+            let estimate = gradient.iter().zip(&r).map(|(g, r)| g * r).sum::<f64>() / norm;
+            let spread = errors(&r, &ones).spread_of_slow_noise(std::slice::from_ref(&gradient), BLOCK);
+            found += estimate * estimate / f64::from(TRIALS);
+            stated += spread[(0, 0)] / norm / norm / f64::from(TRIALS);
+        }
+        // A variance of 60 is known to 18 %.
+        assert!((0.6..1.6).contains(&(stated / found)), "{stated} for {found}");
+    }
+}
