@@ -3,7 +3,7 @@
 //! Half the difference is even in speed: Coulomb and viscous friction, and a Stribeck curve in one direction where there is
 //! one. A curve in each would hold the same one in both, which is `bearing_stribeck`: two different ones are that and this.
 
-use super::stribeck_curve::Curve;
+use super::stribeck_curve::{Curve, turns_both_ways};
 use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
 use crate::identify::drive::direction;
@@ -12,8 +12,6 @@ use crate::identify::term::Parameter;
 /// The effect.
 pub(super) struct BearingAsymmetry;
 
-/// Share of the motion that goes the rarer way at least: less is the encoder's noise about a standstill.
-const SEEN: f64 = 0.01;
 /// Ends of the names of what belongs to one direction.
 const WAYS: [&str; 2] = ["_forward", "_backward"];
 
@@ -28,10 +26,8 @@ impl Effect for BearingAsymmetry {
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let s = view.scales;
-        // What turns one way alone does not show a difference, and its columns would be those of the bearing itself.
-        let turned = view.logs.iter().flat_map(|log| direction(log, s.speed));
-        let (forward, backward) = turned.fold((0.0, 0.0), |(f, b), d| (f + d.max(0.0), b - d.min(0.0)));
-        if f64::min(forward, backward) < SEEN * (forward + backward) {
+        // Its columns would be those of the bearing itself.
+        if !turns_both_ways(view) {
             return Vec::new();
         }
         let magnitude = |values: Vec<f64>| values.into_iter().map(f64::abs).collect::<Vec<f64>>();

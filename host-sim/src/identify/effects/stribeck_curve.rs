@@ -8,12 +8,23 @@ use super::{DriveLog, DriveView};
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
 
-/// Widths, in shares of the usual speed: from standstill to all of it, a factor of two apart. What falls beyond it is no
-/// friction near zero, but a controller that gives less torque the faster it turns.
+/// Widths, in shares of the usual speed: from standstill to all of it, a factor of two apart.
 const SHARES: [f64; 8] = [0.0078, 0.0156, 0.0312, 0.0625, 0.125, 0.25, 0.5, 1.0];
+/// The widest where the logs turn one way alone: there a controller gives less torque the faster it turns, and what falls over
+/// the usual speed is the controller's. No controller of one speed gives the same curve both ways.
+const WIDEST_ONE_WAY: f64 = 0.5;
+/// Share of the motion that goes the rarer way at least: less is the encoder's noise about a standstill.
+const SEEN: f64 = 0.01;
 /// What the names of a width and of its excess begin with.
 const SPEED: &str = "stribeck_speed";
 const EXCESS: &str = "static_excess";
+
+/// Whether the logs turn both ways: what turns one way alone shows no difference of the two.
+pub(super) fn turns_both_ways(view: &DriveView<'_>) -> bool {
+    let turned = view.logs.iter().flat_map(|log| direction(log, view.scales.speed));
+    let (forward, backward) = turned.fold((0.0, 0.0), |(f, b), d| (f + d.max(0.0), b - d.min(0.0)));
+    f64::min(forward, backward) >= SEEN * (forward + backward)
+}
 
 /// Widths of a curve.
 pub(super) struct Curve {
@@ -23,12 +34,16 @@ pub(super) struct Curve {
 impl Curve {
     /// By the usual speed, or as found on other logs.
     pub(super) fn new(view: &DriveView<'_>) -> Self {
-        let known = |k: usize| {
-            let fixed = view.fixed?.iter().find(|(name, _)| *name == format!("{SPEED}_{}", k + 1))?;
-            Some(fixed.1)
+        let usual = || {
+            let widest = if turns_both_ways(view) { 1.0 } else { WIDEST_ONE_WAY };
+            SHARES.iter().filter(|share| **share <= widest).map(|share| share * view.scales.speed).collect()
         };
-        let speed = |(k, share)| known(k).unwrap_or(share * view.scales.speed);
-        Self { speeds: SHARES.into_iter().enumerate().map(speed).collect() }
+        let found = |fixed: &[(String, f64)]| {
+            let one =
+                |k: usize| fixed.iter().find(|(name, _)| *name == format!("{SPEED}_{k}")).map(|(_, v)| *v);
+            (1..=SHARES.len()).map_while(one).collect()
+        };
+        Self { speeds: view.fixed.map_or_else(usual, found) }
     }
 
     /// Names and values of the widths.
