@@ -14,9 +14,9 @@ use super::contact::log::{ContactLog, OBSERVED_OVER};
 use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
 use super::filters::rms;
 use super::fit_bias::Resimulated;
-use super::fit_interval::{Residuals, covariance};
+use super::fit_interval::{Residuals, covariance, known};
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
-use super::fit_profile::{Form, Known, profiles};
+use super::fit_profile::{Form, Profiles, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
@@ -207,19 +207,20 @@ pub fn identify(
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let columns = problem.jacobian(&[], &fit.p, &fit.r);
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
-    let (mut of_p, mut under_prior) = {
+    let (mut likely, mut under_prior) = {
         let residuals = Residuals::new(&problem, &fit);
-        (covariance(&columns, &residuals, &alone), covariance(&columns, &residuals, &prior_sd))
+        (known(&columns, &residuals, &alone), covariance(&columns, &residuals, &prior_sd))
     };
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);
     let left = smoothed_rms(&left.collect::<Vec<_>>(), logs[0].grid.step_s);
     let simulated = Simulated::new(model, rig, &baseline, free, raw, (&found, left))?.fit(&found, progress);
-    let simulated = simulated.and_then(|fit| Some((fit.covariance()?, fit.p)));
+    let simulated = simulated.and_then(|fit| Some((fit.known()?, fit.p)));
     let by_simulation = simulated.is_some();
-    if let Some((covariance, p)) = simulated {
+    if let Some((known, p)) = simulated {
         (fit.p, found) = (p.clone(), p);
-        (of_p, under_prior) = (covariance.clone(), covariance);
+        under_prior = known.covariance.clone();
+        likely = known;
     } else {
         let resimulated = Resimulated { model, rig, baseline: &baseline, free, raw };
         fit.p = resimulated.unbiased(&problem, &fit, progress)?;
@@ -238,12 +239,12 @@ pub fn identify(
     let form = if by_simulation { Form::OF_SIMULATION } else { Form::BIAS_REMOVED };
     let known_to = (smoothing_s, DRIFT * usual_m_s, form);
     let logs_of = |p: &[f64]| DVector::from_vec(values(model, &baseline, p, free)).map(f64::ln);
-    let known = profiles(&baseline, (&fit.p, &found), &of_p, slid.collect(), known_to, logs_of);
+    let profiles = profiles(&baseline, (&fit.p, &found), &likely, slid.collect(), known_to, logs_of);
     let before = values(model, &baseline, &found, free);
     let values = values(model, &baseline, &fit.p, free);
     let bias = before.iter().zip(&values).map(|(before, value)| before / value - 1.0).collect();
-    let uncertain = match known {
-        Some(known) => Uncertain::of_profiles(&values, &known),
+    let uncertain = match profiles {
+        Some(profiles) => Uncertain::of_profiles(&values, &profiles),
         None => {
             let to_log = log_derivatives(model, &baseline, &fit.p, free);
             Uncertain::about(&values, &(&to_log * under_prior * to_log.transpose()))
@@ -319,7 +320,7 @@ impl Uncertain {
     }
 
     /// From profiles of the posterior.
-    fn of_profiles(values: &[f64], known: &Known) -> Self {
+    fn of_profiles(values: &[f64], known: &Profiles) -> Self {
         let ends = || known.ends.iter().zip(values);
         Self {
             std: ends().map(|((low, high), value)| value * (high - low) / (2.0 * INTERVAL_95)).collect(),

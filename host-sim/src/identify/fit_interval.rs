@@ -53,8 +53,22 @@ impl<'a> Residuals<'a> {
     }
 }
 
+/// What a likelihood says of parameters about where they were fitted.
+pub(super) struct Known {
+    /// Covariance.
+    pub(super) covariance: DMatrix<f64>,
+    /// From where they were fitted to the likelihood's own top, the prior left out: H⁻¹ Σ ψ(r_t) j_t, and not cov p times the
+    /// prior's slope: a likelihood that is less sure than it pretends to be pulls no less.
+    pub(super) to_top: DVector<f64>,
+}
+
 /// Covariance of parameters whose prior is `prior_sd`, from the columns −∂r/∂p.
 pub(super) fn covariance(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f64]) -> DMatrix<f64> {
+    known(columns, of, prior_sd).covariance
+}
+
+/// The same, and where the likelihood's top is.
+pub(super) fn known(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f64]) -> Known {
     let Residuals { r, deviation_nm, slides, lengths } = of;
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
@@ -88,7 +102,11 @@ pub(super) fn covariance(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f
     }
     let factor = linear::factor(&h);
     let covariance = factor.solve(&factor.solve(&spread).transpose());
-    DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * prior_sd[i] * prior_sd[j])
+    let to_top = factor.solve(&DVector::from_fn(n, |i, _| linear::dot(&scaled[i], &score)));
+    Known {
+        covariance: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * prior_sd[i] * prior_sd[j]),
+        to_top: to_top.component_mul(&DVector::from_column_slice(prior_sd)),
+    }
 }
 
 /// Samples that count as one to what is fitted: tr(V₀⁻¹V)/n, V the variance of the score from blocks and V₀ that of samples
@@ -150,25 +168,43 @@ mod tests {
     }
 
     /// Of residuals of deviation 1 in one log that slides throughout.
-    fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> DMatrix<f64> {
+    fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> Known {
         let deviation_nm = vec![1.0; r.len()];
         let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
-        covariance(columns, &Residuals { r, deviation_nm: &deviation_nm, slides, lengths }, prior_sd)
+        known(columns, &Residuals { r, deviation_nm: &deviation_nm, slides, lengths }, prior_sd)
     }
 
     #[test]
     fn the_mean_of_white_noise_has_its_own_deviation() {
         let n = 8000;
-        let c = of(&[vec![1.0; n]], &noise(n, 3), &[1.0]);
+        let c = of(&[vec![1.0; n]], &noise(n, 3), &[1.0]).covariance;
         // Forty blocks know a variance within 22 %, one deviation; Student's weights cost 1/0.93 on normal noise.
         let ratio = c[(0, 0)] * n as f64;
         assert!((0.5..1.8).contains(&ratio), "{ratio}");
     }
 
     #[test]
+    fn the_top_is_where_the_slope_says_however_uncertain_it_is() {
+        let n = 8000;
+        // A mean of 0.1 that the prior kept out of the fit; beside it a swing of the whole log's length in the residuals.
+        let of = |swing: f64| {
+            let wave = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin();
+            let r: Vec<f64> =
+                noise(n, 3).iter().enumerate().map(|(i, x)| 0.1 + x + swing * wave(i)).collect();
+            of(&[vec![1.0; n]], &r, &[1.0])
+        };
+        let (quiet, swings) = (of(0.0), of(0.5));
+        let grows = swings.covariance[(0, 0)] / quiet.covariance[(0, 0)];
+        assert!(grows > 5.0, "{grows}");
+        for known in [quiet, swings] {
+            assert!((known.to_top[0] - 0.1).abs() < 0.03, "{}", known.to_top);
+        }
+    }
+
+    #[test]
     fn what_changes_nothing_is_as_uncertain_as_its_prior() {
         let n = 2000;
-        let c = of(&[vec![1.0; n], vec![0.0; n]], &noise(n, 5), &[1.0, 0.7]);
+        let c = of(&[vec![1.0; n], vec![0.0; n]], &noise(n, 5), &[1.0, 0.7]).covariance;
         assert!((c[(1, 1)].sqrt() - 0.7).abs() < 1e-9, "{c}");
     }
 }

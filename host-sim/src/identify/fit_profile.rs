@@ -11,6 +11,7 @@ use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
 
 use super::contact::problem::{Baseline, Role};
+use super::fit_interval::Known;
 use super::linear;
 use crate::fit::covariance::INTERVAL_95;
 use crate::least_squares::Problem;
@@ -112,7 +113,7 @@ fn speeds(mut slid_m_s: Vec<f64>, count: usize) -> Option<Vec<f64>> {
 }
 
 /// What is known of the file's parameters, in ln.
-pub(super) struct Known {
+pub(super) struct Profiles {
     /// Ends of the 95 % intervals.
     pub(super) ends: Vec<(f64, f64)>,
     /// Covariance at the top.
@@ -183,17 +184,17 @@ impl<F: Fn(&[f64]) -> DVector<f64>> Posterior<'_, F> {
     }
 }
 
-/// What is known about the top `p`, which the likelihood had at `found` before its bias was taken off; `covariance` is that of
-/// the likelihood alone there, for a slip that is smoothed over this width and known to this error, and `logs` gives the file's
+/// What is known about the top `p`, which the likelihood had at `found` before its bias was taken off; `likely` is what the
+/// likelihood alone says there, for a slip that is smoothed over this width and known to this error, and `logs` gives the file's
 /// parameters. `None` where what is seen has no inverse, as in sliding at one speed.
 pub(super) fn profiles(
     baseline: &Baseline,
     (p, found): (&[f64], &[f64]),
-    covariance: &DMatrix<f64>,
+    likely: &Known,
     slid_m_s: Vec<f64>,
     (smoothing_s, slip_error_m_s, form): (f64, f64, Form),
     logs: impl Fn(&[f64]) -> DVector<f64>,
-) -> Option<Known> {
+) -> Option<Profiles> {
     let n = p.len();
     let count = baseline.free.iter().filter(|base| Seen::is_curve(base.role)).count();
     let seen = Seen { baseline, speeds_m_s: speeds(slid_m_s, count)? };
@@ -203,7 +204,7 @@ pub(super) fn profiles(
     if ratio.is_nan() || ratio < LOST {
         return None;
     }
-    let mut of_seen = &g * covariance * g.transpose();
+    let mut of_seen = &g * &likely.covariance * g.transpose();
     let correction = seen.at(p) - seen.at(found);
     let curve = seen.of_slip_error(p, slip_error_m_s).into_iter().map(|of_slip| of_slip.hypot(form.curve));
     let numbers = baseline.numbers(p);
@@ -218,11 +219,8 @@ pub(super) fn profiles(
         let form = left.hypot(CORRECTION_UNKNOWN * correction[i]);
         of_seen[(i, i)] += form * form;
     }
-    // Where it was found the likelihood's slope stands against the prior's; its own top lies beyond.
-    let pull = DVector::from_fn(n, |i, _| {
-        (found[i] - baseline.free[i].parameter.mean) / baseline.free[i].parameter.sd.powi(2)
-    });
-    let top = seen.at(p) + &g * (covariance * pull);
+    // The prior holds what was found; the likelihood's own top lies beyond.
+    let top = seen.at(p) + &g * &likely.to_top;
     let posterior = Posterior { seen, top, spread: linear::factor(&of_seen).l(), logs };
     let best = posterior.best(p, None);
     let mut precision = {
@@ -239,7 +237,7 @@ pub(super) fn profiles(
         (posterior.end(&best, which, deviation, -1.0), posterior.end(&best, which, deviation, 1.0))
     });
     let ends = ends.collect();
-    Some(Known { ends, local })
+    Some(Profiles { ends, local })
 }
 
 #[cfg(test)]
@@ -269,9 +267,9 @@ mod tests {
         let of = |deviation: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
             let logs = |q: &[f64]| DVector::from_vec(values(&model, &baseline, q, &free)).map(f64::ln);
+            let likely = Known { covariance, to_top: DVector::zeros(p.len()) };
             let known =
-                profiles(&baseline, (&p, &p), &covariance, slid(), (0.0, 0.0, Form::BIAS_REMOVED), logs)
-                    .unwrap();
+                profiles(&baseline, (&p, &p), &likely, slid(), (0.0, 0.0, Form::BIAS_REMOVED), logs).unwrap();
             (known.ends[2].0 - p[2], known.ends[2].1 - p[2])
         };
         let (low, high) = of(0.02);

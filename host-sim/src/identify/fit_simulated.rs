@@ -18,7 +18,9 @@ use rayon::prelude::*;
 
 use super::contact::problem::{Baseline, Numbers, Role};
 use super::filters::{gaussian, rms};
+use super::fit_interval::Known;
 use super::fit_parameters::{set_all, values};
+use super::linear::factor;
 use super::slow_noise::Errors;
 use crate::files::log::Log;
 use crate::files::model_file::{ModelFile, SOME_STEP_S};
@@ -77,8 +79,8 @@ pub(super) struct SimulatedFit {
 }
 
 impl SimulatedFit {
-    /// Covariance of the values; `None` where the logs do not tell them apart.
-    pub(super) fn covariance(&self) -> Option<DMatrix<f64>> {
+    /// What the logs say of the values; `None` where they do not tell them apart.
+    pub(super) fn known(&self) -> Option<Known> {
         let residual = self.residual_nm.as_slice();
         let deviation = vec![rms(residual); residual.len()];
         let columns: Vec<Vec<f64>> =
@@ -86,7 +88,9 @@ impl SimulatedFit {
         let block = residual.len() as f64 / BLOCKS as f64;
         let slow = Errors { residual, deviation: &deviation, lengths: &self.lengths }
             .spread_of_slow_noise(&columns, block);
-        sandwich(&self.jacobian, &self.residual_nm, Some(&slow))
+        let covariance = sandwich(&self.jacobian, &self.residual_nm, Some(&slow))?;
+        let normal = factor(&(self.jacobian.transpose() * &self.jacobian));
+        Some(Known { covariance, to_top: -normal.solve(&(self.jacobian.transpose() * &self.residual_nm)) })
     }
 }
 

@@ -91,8 +91,8 @@ impl Errors<'_> {
             for &length in self.lengths {
                 // Σ_s Σ_t g_s g_tᵀ kept^|s−t|, the past of each sample in a state.
                 let mut past = DVector::zeros(n);
-                for i in from..from + length {
-                    let shows = f64::from(u8::from(self.residual[i] != 0.0));
+                for (i, residual) in self.residual.iter().enumerate().skip(from).take(length) {
+                    let shows = f64::from(u8::from(*residual != 0.0));
                     let now = DVector::from_fn(n, |k, _| shows * gradients[k][i]);
                     past *= kept;
                     let across = &now * past.transpose();
