@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
 use super::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
-use super::filters::{self, local_maximum, median_magnitude};
+use super::filters::{self, deviation_by_median, local_maximum};
 use super::linear;
 use super::same_amplitude::{Seen, log_ratio};
 use super::term::Parameter;
@@ -410,9 +410,9 @@ impl Balance {
     /// Takes noise level and effective sample size from the residuals of a solved set.
     pub fn refit_noise(&mut self, solved: &Solved) {
         let r = |i: &usize| solved.residual[*i] / self.deviation[*i];
-        // Median magnitude of a normal deviate is 0.6745. Not below the sensors' noise: where most rows rest, the angle's
+        // Not below the sensors' noise: where most rows rest, the angle's
         // noise is not in them, and a deviation taken from them makes outliers of those that move.
-        let factor = (median_magnitude(self.used.iter().map(r)) / 0.6745).max(1.0);
+        let factor = deviation_by_median(self.used.iter().map(r)).max(1.0);
         let pull: Vec<f64> = self
             .used
             .iter()

@@ -255,6 +255,13 @@ pub fn median_magnitude(values: impl Iterator<Item = f64>) -> f64 {
     *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// Deviation of normal values about zero, by the median of their sizes: what is far out does not count.
+pub fn deviation_by_median(values: impl Iterator<Item = f64>) -> f64 {
+    /// Median size of a normal deviate.
+    const MEDIAN: f64 = 0.6745;
+    median_magnitude(values) / MEDIAN
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,11 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filters::median_magnitude;
+use super::filters::{deviation_by_median, median_magnitude};
 use super::linear;
 
-/// Deviation of a normal distribution over the median of its sizes.
-const NORMAL: f64 = 1.4826;
 /// Variance of a variance from so many differences, times their number, over its square: 2 of normal ones, of which their
 /// median takes 37 % as much notice.
 const VARIANCE_OF_VARIANCE: f64 = 2.0 / 0.37;
@@ -63,7 +61,7 @@ impl Errors<'_> {
             }
         }
         let count = differences.len();
-        let size = NORMAL * median_magnitude(differences.into_iter());
+        let size = deviation_by_median(differences.into_iter());
         (median_magnitude(white.into_iter()), 0.5 * size * size, count)
     }
 
@@ -92,20 +90,20 @@ impl Errors<'_> {
         for kept in BLOCKS_LONG.map(|long| (-1.0 / (long * block)).exp()) {
             let mut from = 0;
             for &length in self.lengths {
-                // Σ_s Σ_t g_s g_tᵀ kept^|s−t|, the past of each sample in a state.
+                // Σ_s Σ_t g_s g_tᵀ kept^|s−t| is the symmetric part of Σ_t g_t (g_t + 2 Σ_{s<t} g_s kept^(t−s))ᵀ.
                 let mut past = DVector::zeros(n);
                 for (i, residual) in self.residual.iter().enumerate().skip(from).take(length) {
                     let shows = f64::from(u8::from(*residual != 0.0));
                     let now = DVector::from_fn(n, |k, _| shows * gradients[k][i]);
                     past *= kept;
-                    let across = &now * past.transpose();
-                    spread += &now * now.transpose() + across.transpose() + across;
+                    spread.ger(1.0, &now, &now, 1.0);
+                    spread.ger(2.0, &now, &past, 1.0);
                     past += now;
                 }
                 from += length;
             }
         }
-        spread * self.of_decade()
+        spread.symmetric_part() * self.of_decade()
     }
 }
 

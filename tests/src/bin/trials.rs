@@ -150,9 +150,8 @@ fn run(arguments: &Arguments) -> Result<(), String> {
 
 fn fits(runner: &Runner, wanted: &Wanted, count: usize) {
     let first = wanted.first_round.wrapping_mul(10_000);
-    let seed = |i: u64| wanted.exact_seed.unwrap_or(first.wrapping_add(i));
-    let count = if wanted.exact_seed.is_some() { 1 } else { count as u64 };
-    let seeds: Vec<u64> = (0..count).map(seed).collect();
+    let drawn = || (0..count as u64).map(|i| first.wrapping_add(i)).collect();
+    let seeds: Vec<u64> = wanted.exact_seed.map_or_else(drawn, |seed| vec![seed]);
     let fit = |seed: &u64| coverage::fit(runner, &wanted.scenario, *seed);
     print!("{}", coverage::table(&runner.each(&seeds, fit, coverage::Fitted::words)));
 }
