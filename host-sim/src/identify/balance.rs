@@ -386,9 +386,9 @@ impl Balance {
             .collect()
     }
 
-    /// What the columns but the base's first make of the response, beside these forms.
-    pub fn bearing(&self, beside: &[&Alternative]) -> Vec<f64> {
-        let Solved { p, residual, .. } = self.solve_forms(beside);
+    /// What a solution beside these forms makes of the response but by the base's first column.
+    pub fn all_but_inertia(&self, solved: &Solved, beside: &[&Alternative]) -> Vec<f64> {
+        let Solved { p, residual, .. } = solved;
         let inertial = &self.base[0].1;
         let added = |i: usize| beside.iter().filter_map(|a| Some(a.response.as_ref()?[i])).sum::<f64>();
         (0..self.response.len())

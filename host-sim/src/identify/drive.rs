@@ -5,7 +5,9 @@
 //! Every term goes through one Gaussian, whose derivatives give ω and ω̇ from the angle; it is as narrow as the angle's
 //! noise allows. Rows near standstill are left out: there the bearing's friction is a reaction.
 
-use super::balance::{Balance, LogRows};
+use std::ops::Range;
+
+use super::balance::{Alternative, Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
 use super::filters::{gaussian, largest_change, rms, steps, white_share};
@@ -41,6 +43,8 @@ const GAIN: f64 = 5e-3;
 pub const INERTIA: usize = 0;
 /// Place of the Coulomb torque.
 pub const COULOMB: usize = 1;
+/// Place of the viscous friction.
+const VISCOUS: usize = 2;
 /// Where the errors of the channels begin.
 const SENSORS: usize = 3;
 
@@ -244,10 +248,62 @@ pub fn response(log: &DriveLog) -> Vec<f64> {
     log.filtered(&y)
 }
 
+/// Speed below which Coulomb's friction is not all there.
+fn turning_speed(usual_speed: f64) -> f64 {
+    0.5 * STANDSTILL * usual_speed
+}
+
 /// Direction of motion, −1 to 1, filtered.
 pub fn direction(log: &DriveLog, usual_speed: f64) -> Vec<f64> {
-    let sign: Vec<f64> = log.speed.iter().map(|v| (v / (0.5 * STANDSTILL * usual_speed)).tanh()).collect();
+    let sign: Vec<f64> = log.speed.iter().map(|v| (v / turning_speed(usual_speed)).tanh()).collect();
     log.filtered(&sign)
+}
+
+/// What bears on a motor beside its inertia and a coupling.
+#[derive(Debug, Clone)]
+pub struct Bearing {
+    /// Its torque, all points of all logs on end, where it turns as the motor does.
+    pub torque_nm: Vec<f64>,
+    coulomb_nm: f64,
+    viscous_nm_s: f64,
+    turning_rad_s: f64,
+}
+
+impl Bearing {
+    /// Of this torque, some of which these values of the base make.
+    pub fn new(torque_nm: Vec<f64>, base: &[f64], scales: &DriveScales) -> Self {
+        let turning_rad_s = turning_speed(scales.speed);
+        let [coulomb_nm, viscous_nm_s] = [base[COULOMB], base[VISCOUS]].map(|p| p.max(0.0));
+        Self { torque_nm, coulomb_nm, viscous_nm_s, turning_rad_s }
+    }
+
+    /// Of what a balance makes of it beside these forms.
+    pub fn beside(balance: &Balance, forms: &[&Alternative], scales: &DriveScales) -> Self {
+        let solved = balance.solve_forms(forms);
+        Self::new(balance.all_but_inertia(&solved, forms), &solved.p, scales)
+    }
+
+    /// The same for a part of the points.
+    pub fn of_points(&self, points: Range<usize>) -> Self {
+        Self { torque_nm: self.torque_nm[points].to_vec(), ..*self }
+    }
+
+    /// Coulomb's and viscous friction at a speed.
+    pub fn friction_nm(&self, speed_rad_s: f64) -> f64 {
+        self.coulomb_nm * (speed_rad_s / self.turning_rad_s).clamp(-1.0, 1.0)
+            + self.viscous_nm_s * speed_rad_s
+    }
+
+    /// Speed after a step of a body that would have this one without that friction: implicit, so that one that stands rests.
+    pub fn slowed(&self, free_rad_s: f64, step_s: f64, inertia_kg_m2: f64) -> f64 {
+        let coulomb = step_s * self.coulomb_nm / inertia_kg_m2;
+        let viscous = 1.0 + step_s * self.viscous_nm_s / inertia_kg_m2;
+        if free_rad_s.abs() > coulomb + viscous * self.turning_rad_s {
+            (free_rad_s - coulomb.copysign(free_rad_s)) / viscous
+        } else {
+            free_rad_s / (viscous + coulomb / self.turning_rad_s)
+        }
+    }
 }
 
 /// What is known of the drive beforehand: nothing by default.
@@ -406,6 +462,6 @@ mod tests {
         let log = DriveLog::made("log".into(), grid, effort, position, None, None, usable, 0.0);
         let scales = DriveScales::new(std::slice::from_ref(&log));
         let p = balance(&[log], &DrivePrior::default(), &scales).solve(&[], &[]).p;
-        assert!(p[COULOMB + 1] >= 0.0, "{p:?}");
+        assert!(p[VISCOUS] >= 0.0, "{p:?}");
     }
 }

@@ -8,7 +8,7 @@ use super::balance::{Alternative, Balance, Company, Solved};
 use super::contact::log::ContactLog;
 use super::contact::problem::Problem;
 use super::contact_part::{self, ContactPart};
-use super::drive::{self, DriveLog, DriveScales};
+use super::drive::{self, Bearing, DriveLog, DriveScales};
 use super::effects::{self, DriveView, NormalLoadView};
 use super::judge::Judgement;
 use super::linear_part::{self, Linear};
@@ -330,7 +330,7 @@ fn drive_alternatives(
         }
         r
     };
-    let known = |own: &Alternative, bearing: Option<&[f64]>| -> Vec<Alternative> {
+    let known = |own: &Alternative, bearing: Option<&Bearing>| -> Vec<Alternative> {
         let view = DriveView {
             logs,
             scales: part.drive_scales.as_ref().unwrap_or(&scales),
@@ -352,13 +352,14 @@ fn drive_alternatives(
     fixed.extend(told.map(|(effect, error_nm)| linear_part::told(effect, logs, error_nm)));
     if !couplings.is_empty() {
         // What is in the shaft is the motor's torque less its inertia and what else bears on it.
-        let mut bearing = vec![0.0; balance.response.len()];
+        let mut torque_nm = vec![0.0; balance.response.len()];
         let base = balance.base.iter().map(|b| &b.1).zip(&solved.p).skip(drive::INERTIA + 1);
         let forms = known_forms(part, solved, &fixed);
         let of_forms = forms.filter_map(|(form, p)| Some(form.columns.iter().zip(p?)));
         for (column, p) in base.chain(of_forms.flatten()) {
-            bearing.iter_mut().zip(column).for_each(|(sum, x)| *sum += p * x);
+            torque_nm.iter_mut().zip(column).for_each(|(sum, x)| *sum += p * x);
         }
+        let bearing = Bearing::new(torque_nm, &solved.p, &scales);
         fixed.extend(couplings.into_iter().flat_map(|own| known(own, Some(&bearing))));
     }
     (balance, fixed)

@@ -2,7 +2,7 @@
 //!
 //! J_d ω̇_d = T_s(θ_m − θ_d, ω_m − ω_d) − T_f − s bearing,   T2 = J_m ω̇_m + (1 − s) bearing + T_s
 //!
-//! with s = 1 where the bearing carries the disc and 0 where it carries the motor.
+//! with s = 1 where the bearing carries the disc, and then follows the disc's speed, and 0 where it carries the motor.
 //!
 //! θ_m and T_f are measured, so only the disc is integrated; a weak pull towards the torque that the motor's own balance
 //! says is in the shaft keeps it from drifting through the gap, whose crossings are too sensitive to be predicted for long.
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::balance::{Alternative, DiscMotion, Solved};
 use super::contact::problem::{FREEDOM, KEPT_PROMISE};
 use super::coupling::{Coupling, Law};
-use super::drive::{DriveLog, INERTIA};
+use super::drive::{Bearing, DriveLog, INERTIA};
 use super::effects::DriveView;
 use super::evidence::BALANCE_SHARE;
 use super::linear;
@@ -50,7 +50,7 @@ fn judged(numbers: &Coupling, log: &DriveLog) -> f64 {
 }
 
 /// Shaft torque and angle of the disc for a log.
-fn shaft_torque(log: &DriveLog, law: &Law, bearing: &[f64], pull: f64) -> (Vec<f64>, Vec<f64>) {
+fn shaft_torque(log: &DriveLog, law: &Law, bearing: &Bearing, pull: f64) -> (Vec<f64>, Vec<f64>) {
     let n = log.len();
     let dt = log.grid.step_s;
     let (disc, omega, k) = (law.disc_inertia, law.omega_rad_s, law.stiffness);
@@ -64,7 +64,7 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &[f64], pull: f64) -> (Vec<f
     let observed: Vec<f64> = effort
         .iter()
         .zip(acceleration)
-        .zip(bearing)
+        .zip(&bearing.torque_nm)
         .map(|((t, a), b)| t - law.motor_inertia * a - (1.0 - on_disc) * b)
         .collect();
     // No smaller than what noise makes: inside the gap the torque is nothing.
@@ -78,14 +78,19 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &[f64], pull: f64) -> (Vec<f
             ((x[i] - x[i - 1]) / dt, if i + 1 < n { (x[i + 1] - x[i]) / dt } else { (x[i] - x[i - 1]) / dt });
         let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
         let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
+        // What the bearing makes beside the friction that follows the disc's speed.
+        let borne = on_disc * (bearing.torque_nm[i] - bearing.friction_nm(log.speed[i]));
         for s in 0..substeps {
             // Drift, kick, drift: motor and disc are seen at the same instant, in the middle of the step.
             let part = (s as f64 + 0.5) / substeps as f64;
             let (motor, rate) = between([x[i - 1], x[i]], [dt * va, dt * vb], part);
             q += 0.5 * h * w;
             let shaft = law.torque(motor - q, rate / dt - w);
-            let borne = friction[i - 1] + (friction[i] - friction[i - 1]) * part + on_disc * bearing[i];
-            w += h * (shaft - borne) / disc;
+            let rubbed = friction[i - 1] + (friction[i] - friction[i - 1]) * part;
+            w += h * (shaft - rubbed - borne) / disc;
+            if on_disc > 0.0 {
+                w = bearing.slowed(w, h, disc);
+            }
             q += 0.5 * h * w;
         }
         let twist = x[i] - q;
@@ -119,7 +124,7 @@ fn alternative(
     effect: &'static str,
     view: &DriveView<'_>,
     numbers: &Coupling,
-    bearing: &[f64],
+    bearing: &Bearing,
     pull: f64,
 ) -> Option<Alternative> {
     let n = numbers;
@@ -130,8 +135,8 @@ fn alternative(
     let mut added = Vec::with_capacity(view.balance.response.len());
     let mut from = 0;
     for log in view.logs {
-        let bearing = &bearing[from..from + log.len()];
-        let (torque, _) = shaft_torque(log, &law, bearing, pull);
+        let bearing = bearing.of_points(from..from + log.len());
+        let (torque, _) = shaft_torque(log, &law, &bearing, pull);
         from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
@@ -140,7 +145,8 @@ fn alternative(
             .enumerate()
             .map(|(i, t)| {
                 // Of what the disc bears the friction stands in the response, and the bearing beside it.
-                friction.map_or(0.0, |f| f[i]) + law.bearing_on_disc * bearing[i] - t.clamp(-most, most)
+                friction.map_or(0.0, |f| f[i]) + law.bearing_on_disc * bearing.torque_nm[i]
+                    - t.clamp(-most, most)
             })
             .collect();
         if change.iter().any(|x| !x.is_finite()) {
@@ -187,7 +193,7 @@ fn stated(
     effect: &'static str,
     view: &DriveView<'_>,
     numbers: &Coupling,
-    bearing: &[f64],
+    bearing: &Bearing,
 ) -> Option<Alternative> {
     let form = alternative(effect, view, numbers, bearing, judged(numbers, &view.logs[0]))?;
     Some(reckoned(view, numbers, bearing, form))
@@ -195,14 +201,15 @@ fn stated(
 
 /// The best plain coupling of a grid, and where one is asked for the best of each other shape.
 fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Vec<Alternative> {
+    let borne = |forms: &[&Alternative]| Bearing::beside(view.balance, forms, view.scales);
     let trial_near =
-        |numbers: &Coupling, bearing: &[f64], pull: f64, near: Option<&Solved>| -> Option<Trial> {
+        |numbers: &Coupling, bearing: &Bearing, pull: f64, near: Option<&Solved>| -> Option<Trial> {
             let alternative = alternative(effect, view, numbers, bearing, pull)?;
             let solved = view.balance.solve_near(&view.company.with(&alternative), near);
             Some(Trial { numbers: *numbers, alternative, solved })
         };
-    let trial = |numbers: &Coupling, bearing: &[f64], pull: f64| trial_near(numbers, bearing, pull, None);
-    let refined_by = |start: Trial, bearing: &[f64], pull: f64| {
+    let trial = |numbers: &Coupling, bearing: &Bearing, pull: f64| trial_near(numbers, bearing, pull, None);
+    let refined_by = |start: Trial, bearing: &Bearing, pull: f64| {
         refined(view, start, &|numbers: &Coupling, near: &Solved| {
             trial_near(numbers, bearing, pull, Some(near))
         })
@@ -210,14 +217,14 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
     let better = |a: (Trial, f64), b: (Trial, f64)| {
         if a.0.solved.log_evidence + a.1 < b.0.solved.log_evidence + b.1 { b } else { a }
     };
-    let best_of = |starts: Vec<Trial>, bearing: &[f64]| -> Option<(Trial, f64)> {
+    let best_of = |starts: Vec<Trial>, bearing: &Bearing| -> Option<(Trial, f64)> {
         starts.into_par_iter().filter_map(|start| refined_by(start, bearing, PULL)).reduce_with(better)
     };
-    let made = |(best, log_prior): (Trial, f64), bearing: &[f64]| -> Option<Alternative> {
+    let made = |(best, log_prior): (Trial, f64), bearing: &Bearing| -> Option<Alternative> {
         Some(Alternative { log_prior, ..stated(effect, view, &best.numbers, bearing)? })
     };
     let sharpened = |mut best: (Trial, f64)| -> Option<Alternative> {
-        let bearing = view.balance.bearing(&view.company.with(&best.0.alternative));
+        let bearing = borne(&view.company.with(&best.0.alternative));
         let weaker = if best.0.numbers.is_play() { &[][..] } else { &WEAKER };
         for pull in weaker {
             let start = trial(&best.0.numbers, &bearing, *pull);
@@ -226,7 +233,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         }
         made(best, &bearing)
     };
-    let bearing = view.balance.bearing(view.company.forms);
+    let bearing = borne(view.company.forms);
     let starts = |bends: bool| -> Vec<Trial> {
         let of = |numbers: Coupling| trial(&if bends { numbers.bent() } else { numbers }, &bearing, PULL);
         let ways: Vec<Coupling> = grid.iter().flat_map(Coupling::borne_either_way).collect();
@@ -265,13 +272,18 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
 }
 
 /// With the disc's motion in each way.
-fn reckoned(view: &DriveView<'_>, numbers: &Coupling, bearing: &[f64], mut form: Alternative) -> Alternative {
+fn reckoned(
+    view: &DriveView<'_>,
+    numbers: &Coupling,
+    bearing: &Bearing,
+    mut form: Alternative,
+) -> Alternative {
     let starts = view.logs.iter().scan(0, |from, log| Some(std::mem::replace(from, *from + log.len())));
     let logs: Vec<(&DriveLog, usize)> = view.logs.iter().zip(starts).collect();
     let law = numbers.law(view.inertia, view.scales.effort);
     let angles = |pull: f64| -> Vec<Vec<f64>> {
         let of = |(log, from): &(&DriveLog, usize)| {
-            shaft_torque(log, &law, &bearing[*from..*from + log.len()], pull).1
+            shaft_torque(log, &law, &bearing.of_points(*from..*from + log.len()), pull).1
         };
         logs.iter().map(of).collect()
     };
@@ -376,11 +388,11 @@ mod tests {
     /// A disc that is rubbed and swings behind a coupling under a torque of three sines, with rests, without which nothing tells the
     /// noise of the angle; that in counts of 120 000 a turn.
     fn log(torque: impl Fn(f64, f64) -> f64) -> DriveLog {
-        borne(torque, [0.02, 0.0])
+        borne(torque, [0.02, 0.0], 0.0)
     }
 
-    /// The same with this viscous friction of a bearing of motor and disc.
-    fn borne(torque: impl Fn(f64, f64) -> f64, [of_motor, of_disc]: [f64; 2]) -> DriveLog {
+    /// The same with this viscous friction of a bearing of motor and disc, and with this Coulomb friction of the disc's.
+    fn borne(torque: impl Fn(f64, f64) -> f64, [of_motor, of_disc]: [f64; 2], coulomb: f64) -> DriveLog {
         let h = 1e-3 / STEPS_PER_SAMPLE as f64;
         let (mut motor, mut disc) = ([0.0f64; 2], [0.0f64; 2]);
         let noise = white(8000, 3);
@@ -401,6 +413,7 @@ mod tests {
             motor[1] += h * (driven - of_motor * motor[1] - shaft) / (INERTIA_KG_M2 - DISC_KG_M2);
             let rubbed = (disc[1] / 0.3).tanh();
             disc[1] += h * (shaft - rubbed - of_disc * disc[1]) / DISC_KG_M2;
+            disc[1] -= disc[1].signum() * (h * coulomb / DISC_KG_M2).min(disc[1].abs());
             motor[0] += h * motor[1];
             disc[0] += h * disc[1];
         }
@@ -463,12 +476,35 @@ mod tests {
     fn the_bearing_is_found_on_the_side_that_it_carries() {
         for (viscous, on_disc) in [([0.04, 0.0], 0.0), ([0.0, 0.04], 1.0)] {
             let (k, d) = (200.0, 0.1);
-            let log = borne(|twist, rate| k * twist + d * rate, viscous);
+            let log = borne(|twist, rate| k * twist + d * rate, viscous, 0.0);
             let found = found("shaft_torsion", log, &[Coupling::spring(20.0, 0.03, 0.65)]);
             let share = found.iter().find(|(name, _)| name == "bearing_on_disc_share").map_or(0.0, |c| c.1);
             assert_eq!(share, on_disc, "{found:?}");
             assert_near(&found, "stiffness_nm_per_rad", k, 0.02);
         }
+    }
+
+    #[test]
+    fn a_bearing_of_the_disc_reverses_when_the_disc_does() {
+        // A spring so soft that motor and disc turn either way for a tenth of the time.
+        let (k, d, coulomb) = (40.0, 0.05, 0.4);
+        let logs = [borne(|twist, rate| k * twist + d * rate, [0.0, 0.0], coulomb)];
+        let scales = DriveScales::new(&logs);
+        let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
+        let spring = Coupling { bearing_on_disc: true, ..Coupling::spring(9.6, 0.04, 0.61) };
+        let law = spring.law(INERTIA_KG_M2, scales.effort);
+        let left = |coulomb_nm: f64| {
+            // The torque is the same; how much of it follows the disc's speed is not.
+            let torque_nm = drive::direction(&logs[0], scales.speed).iter().map(|s| coulomb * s).collect();
+            let bearing = Bearing::new(torque_nm, &[0.0, coulomb_nm, 0.0], &scales);
+            let (shaft, _) = shaft_torque(&logs[0], &law, &bearing, 0.01);
+            let [effort, acceleration] = &logs[0].quick;
+            let rest: Vec<f64> = (0..shaft.len())
+                .map(|i| effort[i] - law.motor_inertia * acceleration[i] - shaft[i])
+                .collect();
+            balance.rms(&rest)
+        };
+        assert!(left(coulomb) < 0.3 * left(0.0), "{} {}", left(coulomb), left(0.0));
     }
 
     #[test]
@@ -505,7 +541,7 @@ mod tests {
             let (omega, damping_ratio) = ((k / DISC_KG_M2).sqrt(), 0.01);
             let d = 2.0 * damping_ratio * k / omega;
             let viscous = if bearing_on_disc { [0.0, 0.02] } else { [0.02, 0.0] };
-            let logs = [borne(|twist, rate| k * twist + d * rate, viscous)];
+            let logs = [borne(|twist, rate| k * twist + d * rate, viscous, 0.0)];
             let scales = DriveScales::new(&logs);
             let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
             let disc_share = DISC_KG_M2 / INERTIA_KG_M2;
@@ -514,7 +550,8 @@ mod tests {
             let constants = numbers.constants(&numbers.law(INERTIA_KG_M2, scales.effort));
             let viscous: Vec<f64> = logs[0].speed.iter().map(|w| 0.02 * w).collect();
             let residual = balance.solve(&[], &[]).residual;
-            [viscous.clone(), balance.bearing(&[])].map(|bearing| {
+            let told = Bearing::new(viscous.clone(), &[0.0, 0.0, 0.02], &scales);
+            [told, Bearing::beside(&balance, &[], &scales)].map(|bearing| {
                 let view = DriveView {
                     logs: &logs,
                     scales: &scales,

@@ -9,7 +9,7 @@ use crate::identify::balance::{Alternative, Balance, Company};
 use crate::identify::contact::change::{Change, ContactTerm};
 use crate::identify::contact::log::ContactLog;
 use crate::identify::contact_part::ContactPart;
-use crate::identify::drive::{DriveLog, DriveScales};
+use crate::identify::drive::{Bearing, DriveLog, DriveScales};
 use crate::identify::normal_load::{NormalLoadLog, NormalLoadScales};
 use coordinates::Coordinates;
 
@@ -47,7 +47,7 @@ pub struct DriveView<'a> {
     pub fixed: Option<&'a [(String, f64)]>,
     /// What bears on the motor beside its inertia and a coupling by the values found on other logs: a shape that was found
     /// there needs it.
-    pub bearing: Option<&'a [f64]>,
+    pub bearing: Option<&'a Bearing>,
 }
 
 /// Shapes that are tried: those of a grid, or the one that was found on other logs.
