@@ -59,13 +59,13 @@ pub struct DiscCause {
 }
 
 impl ContactPart {
-    /// Searches the training logs, with what the drive says of the disc's motion; beside it what the best set changes.
+    /// Searches the training logs, with what the drive says of the disc's motion.
     pub fn searched(
         logs: Vec<ContactLog>,
         (model, rig): (&ModelFile, &RigFile),
         drive: Option<&Linear>,
         progress: &(dyn Fn(&str) + Sync),
-    ) -> (Self, Change) {
+    ) -> Self {
         let block = baseline::has_block(model);
         let baseline = baseline::baseline(model, baseline::KNOWN_WITHIN).with_bridge_zeros(rig);
         let (logs, disc_cause) = with_disc_motion(logs, &baseline, drive);
@@ -74,10 +74,14 @@ impl ContactPart {
         let mut problem = Problem::new(&logs, &baseline, &terms);
         let ranked = search::search(&mut problem, &[], progress).ranked;
         let contributions = contributions(&problem, &ranked);
-        let best = of_largest_posterior(&ranked, &contributions);
-        let best = problem.change(&best.terms, &best.p);
         let noise = problem.noise.clone();
-        (Self { logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }, best)
+        Self { logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }
+    }
+
+    /// What the likeliest set changes whose causes are all large enough to be told.
+    pub fn best_change(&self) -> Change {
+        let best = of_largest_posterior(&self.ranked, &self.contributions);
+        self.problem().change(&best.terms, &best.p)
     }
 
     /// Searched again without causes that the drive denies; the best sets that have one stay in the comparison.
@@ -91,6 +95,12 @@ impl ContactPart {
         let contributions = contributions(&problem, &ranked);
         let noise = problem.noise.clone();
         Self { noise, ranked, contributions, ..self }
+    }
+
+    /// What a candidate changes.
+    pub fn change(&self, place: usize) -> Change {
+        let fit = self.fit(place);
+        self.problem().change(&fit.terms, &fit.p)
     }
 
     /// The likelihood of the training logs.

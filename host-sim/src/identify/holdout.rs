@@ -112,8 +112,7 @@ pub fn errors(
     if let Some(contact) = &found.contact {
         let place = found.place(Part::Friction).unwrap_or(0);
         let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
-        let fit = contact.fit(place);
-        let change = contact.problem().change(&fit.terms, &fit.p);
+        let change = contact.change(place);
         let sensed = contact_part::behind_channel(&prepared, &change);
         let told = contact.channel_errors(sensed.as_ref().unwrap_or(&prepared), training);
         let drives: Option<Vec<DriveLog>> = sensed

@@ -69,18 +69,28 @@ pub fn judge(
         progress("drive");
         Found { drive: Some(of_drive_logs(train, !linear_stage)?), ..Found::default() }
     };
-    let Found { contact, mut drive, mut normal_load, mut notes } = found;
-    for (part, what, linear) in [
-        (Part::Drive, "the drive", &mut drive),
-        (Part::Pressure, "the normal-load actuator", &mut normal_load),
-    ] {
-        if linear.as_ref().is_some_and(|linear| linear.balance.used.is_empty()) {
-            *linear = None;
-            notes.push(format!(
-                "no row of the balance of the {} can be used: {what} is not looked at",
-                part.name()
-            ));
+    let Found { contact, drive, mut notes } = found;
+    let drive = with_rows(drive, Part::Drive, "the drive", &mut notes);
+    let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
+    if let Some(contact) = &contact {
+        parts.push((Part::Friction, contact.candidates()));
+    }
+    if let Some(drive) = &drive {
+        parts.push((Part::Drive, drive.candidates()));
+    }
+    let mut normal_load = None;
+    if let Some(contact) = &contact {
+        if contact.logs.iter().all(|log| log.m1_torque_nm.is_some()) {
+            progress("normal-load actuator");
         }
+        // Of these logs the answer of contact and drive says where the normal channel shows its end.
+        let place = table(&parts).0[0].place(Part::Friction).unwrap_or(0);
+        let seen = contact_part::without_normal_end(&contact.logs, &contact.change(place));
+        let found = of_normal_load(seen.as_ref().unwrap_or(&contact.logs), rig, &mut notes);
+        normal_load = with_rows(found, Part::Pressure, "the normal-load actuator", &mut notes);
+    }
+    if let Some(normal_load) = &normal_load {
+        parts.push((Part::Pressure, normal_load.candidates()));
     }
     notes.extend(contact.as_ref().and_then(|contact| contact.noise.unresolved()));
     if contact.as_ref().is_some_and(rest::nothing_is_known) {
@@ -90,16 +100,6 @@ pub fn judge(
         );
     }
     progress("table of causes");
-    let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
-    if let Some(contact) = &contact {
-        parts.push((Part::Friction, contact.candidates()));
-    }
-    if let Some(drive) = &drive {
-        parts.push((Part::Drive, drive.candidates()));
-    }
-    if let Some(normal_load) = &normal_load {
-        parts.push((Part::Pressure, normal_load.candidates()));
-    }
     let (hypotheses, too_small) = table(&parts);
     let mut judgement = Judgement {
         contact,
@@ -122,11 +122,31 @@ pub fn judge(
 struct Found {
     contact: Option<ContactPart>,
     drive: Option<Linear>,
-    normal_load: Option<Linear>,
     notes: Vec<String>,
 }
 
-/// Contact, drive and normal-load actuator. What the contact says of the channels changes what the others see.
+/// A balance where it has rows; else a note says that it has none.
+fn with_rows(linear: Option<Linear>, part: Part, what: &str, notes: &mut Vec<String>) -> Option<Linear> {
+    let has_rows = |linear: &Linear| !linear.balance.used.is_empty();
+    if linear.as_ref().is_some_and(|linear| !has_rows(linear)) {
+        notes.push(format!(
+            "no row of the balance of the {} can be used: {what} is not looked at",
+            part.name()
+        ));
+    }
+    linear.filter(has_rows)
+}
+
+/// The normal-load actuator; `None` where M1's torque is not logged.
+fn of_normal_load(logs: &[ContactLog], rig: &RigFile, notes: &mut Vec<String>) -> Option<Linear> {
+    let logs: Option<Vec<NormalLoadLog>> = logs.iter().map(NormalLoadLog::new).collect();
+    if logs.is_none() {
+        notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
+    }
+    Some(linear_part::search_normal_load(&logs?, rig))
+}
+
+/// Contact and drive. What the contact says of the channels changes what the drive sees.
 fn of_contact_logs(
     train: &[Log],
     rig: &RigFile,
@@ -140,41 +160,39 @@ fn of_contact_logs(
     let of_drive = |logs: &[ContactLog]| -> Option<Linear> {
         Some(linear_part::search_drive(&drive_logs(logs)?, &linear_part::drive_prior(rig), true))
     };
-    let of_normal_load = |logs: &[ContactLog]| -> Option<Linear> {
-        let logs: Option<Vec<NormalLoadLog>> = logs.iter().map(NormalLoadLog::new).collect();
-        Some(linear_part::search_normal_load(&logs?, rig))
-    };
     let mut notes: Vec<String> = train.iter().filter_map(speed_note).collect();
     progress("drive");
     let mut drive = of_drive(&logs);
     if drive.is_none() {
         notes.push("no torque of M2: the drive is not looked at".to_string());
     }
-    if logs.iter().all(|log| log.m1_torque_nm.is_some()) {
-        progress("normal-load actuator");
-    }
-    let mut normal_load = of_normal_load(&logs);
-    if normal_load.is_none() {
-        notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
-    }
-    let (mut contact, best) = ContactPart::searched(logs, (model, rig), drive.as_ref(), progress);
-    if let Some(seen) = contact_part::without_normal_end(&contact.logs, &best) {
-        normal_load = of_normal_load(&seen);
-    }
-    let seen = contact_part::behind_channel(&contact.logs, &best);
+    let mut contact = ContactPart::searched(logs, (model, rig), drive.as_ref(), progress);
+    let mut seen = contact_part::behind_channel(&contact.logs, &contact.best_change());
     if let Some(seen) = &seen {
         drive = of_drive(seen);
     }
-    if let (Some(drive), Some(logs)) = (&mut drive, drive_logs(seen.as_ref().unwrap_or(&contact.logs))) {
-        drive.tell(&logs, &contact);
-        let denied = drive.denied(&contact);
+    if let (Some(of_motor), Some(logs)) = (&mut drive, drive_logs(seen.as_ref().unwrap_or(&contact.logs))) {
+        of_motor.tell(&logs, &contact);
+        let denied = of_motor.denied(&contact);
         if !denied.is_empty() {
             contact = contact.without(&denied, progress);
-            drive.forget();
-            drive.tell(&logs, &contact);
+            // What the channel was thought to do with the causes that are denied is to be forgotten with them.
+            let before = std::mem::replace(
+                &mut seen,
+                contact_part::behind_channel(&contact.logs, &contact.best_change()),
+            );
+            let sees = seen.as_ref().unwrap_or(&contact.logs);
+            if before.is_some() || seen.is_some() {
+                drive = of_drive(sees);
+            } else {
+                of_motor.forget();
+            }
+            if let (Some(drive), Some(logs)) = (&mut drive, drive_logs(sees)) {
+                drive.tell(&logs, &contact);
+            }
         }
     }
-    Ok(Found { contact: Some(contact), drive, normal_load, notes })
+    Ok(Found { contact: Some(contact), drive, notes })
 }
 
 /// What is said of a log whose speed is not used.

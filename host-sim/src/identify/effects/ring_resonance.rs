@@ -9,8 +9,9 @@ use crate::identify::term::{Parameter, Starts};
 /// The effect.
 pub(super) struct RingResonance;
 
-/// Damping ratios: below, it rings on for a second and more; above, it is a delay.
-const DAMPING: (f64, f64) = (2e-3, 0.7);
+/// Damping ratios: below, it rings on for a second and more; above, its peak does not reach √2, so that it has no half-power
+/// bandwidth, and is a delay.
+const DAMPING: (f64, f64) = (2e-3, 0.38);
 
 /// Frequency and damping ratio.
 fn mode(p: &[f64]) -> (f64, f64) {
