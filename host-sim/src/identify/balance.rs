@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
+use super::contact::search::WORTH;
 use super::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
 use super::filters::{self, deviation_by_median, local_maximum};
 use super::linear;
@@ -143,6 +144,8 @@ const CLEAR_WIDTHS: f64 = 2.0;
 /// evidence by half of it: nothing depends on less.
 const MOST_ITERATIONS: usize = 10;
 const CONVERGED: f64 = 1e-3;
+/// Shapes of a combination of effects that are solved, of those that a glance ranks.
+const SHAPES: usize = 2;
 /// What is held moves by no more than this share of its prior's deviation: no signal tells it so well.
 const HELD: f64 = 1e-4;
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
@@ -269,7 +272,7 @@ impl Balance {
         for (q, error) in parameters.iter_mut().skip(self.sensors).zip(errors) {
             (q.mean, q.sd) = (*error, HELD * q.sd);
         }
-        self.solved(parameters, &chosen, None).residual
+        self.solved(parameters, &chosen, None, MOST_ITERATIONS).residual
     }
 
     /// Solves these forms; the set of what it gives is empty.
@@ -279,7 +282,14 @@ impl Balance {
 
     /// The same from the weights of a solution that is near.
     pub fn solve_near(&self, chosen: &[&Alternative], near: Option<&Solved>) -> Solved {
-        self.solved(self.base.iter().map(|b| b.0.clone()).collect(), chosen, near)
+        self.solved(self.base.iter().map(|b| b.0.clone()).collect(), chosen, near, MOST_ITERATIONS)
+    }
+
+    /// A set with the weights of a solution that is near, not reweighted: good enough to compare shapes.
+    fn glance(&self, alternatives: &[Alternative], set: &[usize], near: &Solved) -> Solved {
+        let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
+        let base = self.base.iter().map(|b| b.0.clone()).collect();
+        Solved { set: set.to_vec(), ..self.solved(base, &chosen, Some(near), 1) }
     }
 
     /// The same with these priors of the base.
@@ -288,6 +298,7 @@ impl Balance {
         mut parameters: Vec<Parameter>,
         chosen: &[&Alternative],
         near: Option<&Solved>,
+        iterations: usize,
     ) -> Solved {
         let mut response = self.response.clone();
         let base = self.base.iter().map(|b| &b.1);
@@ -316,7 +327,7 @@ impl Balance {
         let mut r = y.clone();
         let (mut h, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..iterations {
             w.iter_mut().for_each(|w| *w /= self.temper);
             (h, slope) = linear::normal_equations(&x, &w, &y);
             let mut g = slope.clone();
@@ -464,6 +475,10 @@ pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<
     let mut alternatives = propose(balance, Company { forms: &[], residual: &alone.residual }, &|_| true);
     balance.forget_residuals();
     let found = search_sets(balance, &alternatives, most);
+    // What is too small to matter hides nothing.
+    if balance.difference(&found[0].residual, &alone.residual) < WORTH * balance.scale {
+        return (alternatives, found);
+    }
     let best = &found[0].set;
     let effect = |place: &usize| alternatives[*place].effect;
     let mut more: Vec<Alternative> = Vec::new();
@@ -496,43 +511,36 @@ fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize)
     let mut all = vec![empty];
     for round in 0..2 {
         let mut found = vec![balance.solve(alternatives, &[])];
-        let mut parents: Vec<Vec<usize>> = vec![Vec::new()];
+        let mut parents: Vec<Solved> = found.clone();
         for _ in 0..most {
-            let mut sets: Vec<Vec<usize>> = Vec::new();
+            let mut sets: Vec<(Vec<usize>, &Solved)> = Vec::new();
             for parent in &parents {
                 for a in 0..alternatives.len() {
                     let excluded = |b: &usize| {
                         let (a, b) = (&alternatives[a], &alternatives[*b]);
                         a.effect == b.effect || (a.is_coupling() && b.is_coupling())
                     };
-                    if parent.iter().any(excluded) {
+                    if parent.set.iter().any(excluded) {
                         continue;
                     }
-                    let mut set = parent.clone();
+                    let mut set = parent.set.clone();
                     set.push(a);
                     set.sort_unstable();
-                    if !sets.contains(&set) {
-                        sets.push(set);
+                    if sets.iter().all(|(known, _)| *known != set) {
+                        sets.push((set, parent));
                     }
                 }
             }
-            let mut solved: Vec<Solved> =
-                sets.par_iter().map(|set| balance.solve(alternatives, set)).collect();
-            solved.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
             // The best shape of each combination of effects leads on.
-            let effects = |set: &[usize]| {
-                let mut names: Vec<&str> = set.iter().map(|a| alternatives[*a].effect).collect();
-                names.sort_unstable();
-                names
+            let glances =
+                sets.par_iter().map(|(set, parent)| balance.glance(alternatives, set, parent)).collect();
+            let best = best_shapes(alternatives, glances, SHAPES);
+            let refit = |near: &Solved| {
+                let chosen: Vec<&Alternative> = near.set.iter().map(|a| &alternatives[*a]).collect();
+                Solved { set: near.set.clone(), ..balance.solve_near(&chosen, Some(near)) }
             };
-            let mut seen: Vec<Vec<&str>> = Vec::new();
-            solved.retain(|s| {
-                let names = effects(&s.set);
-                let new = !seen.contains(&names);
-                seen.push(names);
-                new
-            });
-            parents = solved.iter().take(3).map(|s| s.set.clone()).collect();
+            let solved = best_shapes(alternatives, best.par_iter().map(refit).collect(), 1);
+            parents = solved.iter().take(3).cloned().collect();
             let best =
                 |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
             let worth = best(&solved) > best(&found);
@@ -550,6 +558,20 @@ fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize)
         all = found;
     }
     all
+}
+
+/// The best of these, at most so many of each combination of effects, the best first.
+fn best_shapes(alternatives: &[Alternative], mut solved: Vec<Solved>, most: usize) -> Vec<Solved> {
+    solved.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    let mut seen: Vec<Vec<&str>> = Vec::new();
+    solved.retain(|s| {
+        let mut names: Vec<&str> = s.set.iter().map(|a| alternatives[*a].effect).collect();
+        names.sort_unstable();
+        let kept = seen.iter().filter(|known| **known == names).count() < most;
+        seen.push(names);
+        kept
+    });
+    solved
 }
 
 #[cfg(test)]

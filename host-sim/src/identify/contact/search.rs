@@ -37,7 +37,7 @@ const FINALISTS: usize = 8;
 
 /// A larger set is looked for where each part of the smaller one changes the prediction by this share of the signal: half
 /// of what the model's form is known to.
-const WORTH: f64 = 0.5 * MODEL_FORM;
+pub const WORTH: f64 = 0.5 * MODEL_FORM;
 /// −ln posterior by which a point has to be better than a known optimum to be another valley's: what a fit leaves undone.
 const NO_WORSE: f64 = 0.5;
 /// Iterations of a set that is fitted from where it stood with one cause more.
