@@ -53,6 +53,14 @@ pub(super) struct Diagnose {
     set: SetArgs,
 }
 
+/// Steps where none is taken twice.
+const STEPS: u64 = 9;
+
+/// How many of these steps had been taken before.
+fn repeated(taken: &[String]) -> u64 {
+    taken.iter().enumerate().filter(|(at, step)| taken[..*at].contains(step)).count() as u64
+}
+
 impl Diagnose {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), InputError> {
@@ -65,17 +73,21 @@ impl Diagnose {
             |paths: &[PathBuf]| paths.iter().map(|path| Log::read(path)).collect::<Result<Vec<_>, _>>();
         let (train, holdout) = (read(&self.train)?, read(&self.holdout)?);
         let mut output = OutputDir::new(&self.out)?;
-        // Drive, normal load, the contact's singles, pairs, triples, evidence, table, held out, extended model.
-        let bar = Mutex::new(Progress::new("looking at", 9));
+        // Drive, the contact's singles, pairs, triples, evidence, normal load, table, held out, extended model.
+        let steps = Mutex::new((Progress::new("looking at", STEPS), Vec::new()));
         let progress = |what: &str| {
-            let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut steps = steps.lock().unwrap_or_else(PoisonError::into_inner);
+            let (bar, taken) = &mut *steps;
+            taken.push(what.to_string());
+            // The contact is searched again where the drive denies what it says of a channel.
+            bar.of(STEPS + repeated(taken));
             bar.say(&format!("looking at: {what}"));
             bar.advance(1);
         };
         let wall_s = || started.elapsed().as_secs_f64();
         let Written { diagnosis, model, page, .. } =
             diagnose(&train, &holdout, &rig, &model, &wall_s, &progress)?;
-        drop(bar);
+        drop(steps);
         output.write_json("diagnosis.json", &diagnosis)?;
         output.write("model-extended.toml", model)?;
         output.write("report.html", page.to_html())?;
@@ -118,4 +130,15 @@ fn summary(diagnosis: &Diagnosis) {
     diagnosis.rejected.iter().take(3).for_each(|r| say(&format!("not {}: {}", r.id, r.why)));
     diagnosis.notes.iter().for_each(|note| say(&format!("note: {note}")));
     say(&format!("next: {}", diagnosis.next_experiment));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_that_are_taken_twice_are_more_work() {
+        let taken = ["drive", "single causes", "evidence", "single causes", "evidence"].map(String::from);
+        assert_eq!([repeated(&taken[..3]), repeated(&taken)], [0, 2]);
+    }
 }
