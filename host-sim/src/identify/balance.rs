@@ -15,8 +15,9 @@ use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
 use super::contact::search::WORTH;
 use super::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
-use super::filters::{self, deviation_by_median, local_maximum};
+use super::filters::{self, deviation_by_median, local_maximum, median_magnitude};
 use super::linear;
+use super::noise;
 use super::same_amplitude::{Seen, log_ratio};
 use super::term::Parameter;
 
@@ -117,6 +118,8 @@ pub struct Balance {
     pub bridge_zero: f64,
     /// Rows that count as one.
     pub temper: f64,
+    /// Width of the widest log's filter, samples.
+    pub filter_samples: f64,
     /// Distance of the used rows, s.
     pub row_step_s: f64,
     /// Where each log's rows begin.
@@ -144,6 +147,9 @@ const CLEAR_WIDTHS: f64 = 2.0;
 /// evidence by half of it: nothing depends on less.
 const MOST_ITERATIONS: usize = 10;
 const CONVERGED: f64 = 1e-3;
+/// Stretches in which a balance's response shows its noise, in widths of its filter: eighteen samples that do not count as one
+/// another, a quarter of a second at 1 kHz, for which a plan mostly holds its speed.
+const STRETCH_WIDTHS: f64 = 64.0;
 /// Shapes of a combination of effects that are solved, of those that a glance ranks.
 const SHAPES: usize = 2;
 /// What is held moves by no more than this share of its prior's deviation: no signal tells it so well.
@@ -228,6 +234,7 @@ impl Balance {
             scale,
             bridge_zero: 0.0,
             temper: FIRST_TEMPER,
+            filter_samples: logs.iter().map(|log| log.width).fold(1.0, f64::max),
             row_step_s,
             starts,
         }
@@ -405,6 +412,29 @@ impl Balance {
         (0..self.response.len())
             .map(|i| self.response[i] + added(i) - residual[i] - p[0] * inertial[i])
             .collect()
+    }
+
+    /// How many times the named noise a residual is, by its median and 1 at least.
+    pub fn over_named_noise(&self, residual: &[f64]) -> f64 {
+        deviation_by_median(self.used.iter().map(|&i| residual[i] / self.first_deviation[i])).max(1.0)
+    }
+
+    /// How many times the named noise the response's own noise is, with what is slower than the filter, as quiet stretches of each
+    /// log show it, and 1 at least: sources are named by the white noise of their channels.
+    pub fn quiet_over_named_noise(&self) -> f64 {
+        let ends = self.starts.iter().skip(1).copied().chain([self.response.len()]);
+        // A Gaussian's samples count as one over the sum of its autocorrelation.
+        let alike = 2.0 * std::f64::consts::PI.sqrt() * self.filter_samples;
+        let stretch = (STRETCH_WIDTHS * self.filter_samples).round() as usize;
+        let quiet = self
+            .starts
+            .iter()
+            .zip(ends)
+            .map(|(start, end)| noise::filtered_deviation(&self.response[*start..end], alike, stretch));
+        // A log that never rests from swinging shows it as noise; the same channels are quiet in another.
+        let quiet = quiet.fold(f64::INFINITY, f64::min);
+        let named = median_magnitude(self.used.iter().map(|&i| self.first_deviation[i]));
+        (quiet / named.max(f64::MIN_POSITIVE)).max(1.0)
     }
 
     /// RMS over the used rows.

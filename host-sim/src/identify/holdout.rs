@@ -265,7 +265,7 @@ fn linear_errors(
     balance: &Balance,
     base: &[f64],
     extended: &[f64],
-    times_s: f64,
+    noise_over_named: f64,
 ) -> Errors {
     let mut errors = Errors::default();
     for (rows, name) in balance.rows_of_logs().iter().zip(names) {
@@ -275,10 +275,10 @@ fn linear_errors(
                 signal: balance.response[i],
                 base: base[i],
                 extended: extended[i],
-                noise: balance.first_deviation[i],
+                noise: noise_over_named * balance.first_deviation[i],
             })
             .collect();
-        errors.add(name, &points, times_s);
+        errors.add(name, &points, balance.row_step_s);
     }
     errors
 }
@@ -300,12 +300,12 @@ fn drive_errors(
             &part.balance,
             &none.residual,
             &part.solved[place].residual,
-            part.balance.row_step_s,
+            part.noise_over_named(place),
         );
     }
     let (balance, fixed) = drive_alternatives(found, part, logs, rig, told);
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(&names, &balance, &base, &extended, balance.row_step_s)
+    linear_errors(&names, &balance, &base, &extended, part.noise_over_named(place))
 }
 
 /// The balance of held-out logs, and the forms of the drive's causes there with the training logs' shapes; `told` is what the
@@ -380,7 +380,7 @@ fn normal_load_errors(
             &part.balance,
             &none.residual,
             &part.solved[place].residual,
-            part.balance.row_step_s,
+            part.noise_over_named(place),
         );
     }
     let own_scales = NormalLoadScales::new(logs);
@@ -400,5 +400,5 @@ fn normal_load_errors(
         fixed.extend(effects::with_id(own.effect).into_iter().flat_map(|e| e.normal_load(&view)));
     }
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(names, &balance, &base, &extended, balance.row_step_s)
+    linear_errors(names, &balance, &base, &extended, part.noise_over_named(place))
 }
