@@ -120,6 +120,8 @@ pub struct Balance {
     pub temper: f64,
     /// Width of the widest log's filter, samples.
     pub filter_samples: f64,
+    /// Whether the response has quiet stretches; what may ripple all the time has none.
+    pub rests: bool,
     /// Distance of the used rows, s.
     pub row_step_s: f64,
     /// Where each log's rows begin.
@@ -235,6 +237,7 @@ impl Balance {
             bridge_zero: 0.0,
             temper: FIRST_TEMPER,
             filter_samples: logs.iter().map(|log| log.width).fold(1.0, f64::max),
+            rests: true,
             row_step_s,
             starts,
         }
@@ -248,8 +251,20 @@ impl Balance {
 
     /// Solves a set of alternatives.
     pub fn solve(&self, alternatives: &[Alternative], set: &[usize]) -> Solved {
+        self.solve_set(alternatives, set, None, MOST_ITERATIONS)
+    }
+
+    /// The same from the weights of a solution that is near, in so many steps; with one, not reweighted, shapes compare.
+    fn solve_set(
+        &self,
+        alternatives: &[Alternative],
+        set: &[usize],
+        near: Option<&Solved>,
+        iterations: usize,
+    ) -> Solved {
         let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
-        Solved { set: set.to_vec(), ..self.solve_forms(&chosen) }
+        let base = self.base.iter().map(|b| b.0.clone()).collect();
+        Solved { set: set.to_vec(), ..self.solved(base, &chosen, near, iterations) }
     }
 
     /// Of what a solution takes for errors of the sensors as much as they are known to have: a deviation of each.
@@ -290,13 +305,6 @@ impl Balance {
     /// The same from the weights of a solution that is near.
     pub fn solve_near(&self, chosen: &[&Alternative], near: Option<&Solved>) -> Solved {
         self.solved(self.base.iter().map(|b| b.0.clone()).collect(), chosen, near, MOST_ITERATIONS)
-    }
-
-    /// A set with the weights of a solution that is near, not reweighted: good enough to compare shapes.
-    fn glance(&self, alternatives: &[Alternative], set: &[usize], near: &Solved) -> Solved {
-        let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
-        let base = self.base.iter().map(|b| b.0.clone()).collect();
-        Solved { set: set.to_vec(), ..self.solved(base, &chosen, Some(near), 1) }
     }
 
     /// The same with these priors of the base.
@@ -396,12 +404,16 @@ impl Balance {
         out
     }
 
+    /// The points of each log, as places in all.
+    fn points_of_logs(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let ends = self.starts.iter().skip(1).copied().chain([self.response.len()]);
+        self.starts.iter().zip(ends).map(|(start, end)| *start..end)
+    }
+
     /// The used rows of each log, as places in all points.
     pub fn rows_of_logs(&self) -> Vec<Vec<usize>> {
-        let end = |at: usize| self.starts.get(at + 1).copied().unwrap_or(self.response.len());
-        (0..self.starts.len())
-            .map(|at| self.used.iter().copied().filter(|i| (self.starts[at]..end(at)).contains(i)).collect())
-            .collect()
+        let used = |points: Range<usize>| self.used.iter().copied().filter(|i| points.contains(i)).collect();
+        self.points_of_logs().map(used).collect()
     }
 
     /// What a solution beside these forms makes of the response but by the base's first column.
@@ -420,19 +432,17 @@ impl Balance {
     }
 
     /// How many times the named noise the response's own noise is, with what is slower than the filter, as quiet stretches of each
-    /// log show it, and 1 at least: sources are named by the white noise of their channels.
+    /// log show it, and 1 at least: sources are named by the white noise of their channels. 1 where there are none.
     pub fn quiet_over_named_noise(&self) -> f64 {
-        let ends = self.starts.iter().skip(1).copied().chain([self.response.len()]);
+        if !self.rests {
+            return 1.0;
+        }
         // A Gaussian's samples count as one over the sum of its autocorrelation.
         let alike = 2.0 * std::f64::consts::PI.sqrt() * self.filter_samples;
         let stretch = (STRETCH_WIDTHS * self.filter_samples).round() as usize;
-        let quiet = self
-            .starts
-            .iter()
-            .zip(ends)
-            .map(|(start, end)| noise::filtered_deviation(&self.response[*start..end], alike, stretch));
+        let of_log = |points| noise::filtered_deviation(&self.response[points], alike, stretch);
         // A log that never rests from swinging shows it as noise; the same channels are quiet in another.
-        let quiet = quiet.fold(f64::INFINITY, f64::min);
+        let quiet = self.points_of_logs().map(of_log).fold(f64::INFINITY, f64::min);
         let named = median_magnitude(self.used.iter().map(|&i| self.first_deviation[i]));
         (quiet / named.max(f64::MIN_POSITIVE)).max(1.0)
     }
@@ -451,8 +461,8 @@ impl Balance {
     /// Takes noise level and effective sample size from the residuals of a solved set.
     pub fn refit_noise(&mut self, solved: &Solved) {
         let r = |i: &usize| solved.residual[*i] / self.deviation[*i];
-        // Not below the sensors' noise: where most rows rest, the angle's
-        // noise is not in them, and a deviation taken from them makes outliers of those that move.
+        // Not below the sensors' noise: where most rows rest, the angle's noise is not in them, and a deviation taken from them
+        // makes outliers of those that move.
         let factor = deviation_by_median(self.used.iter().map(r)).max(1.0);
         let pull: Vec<f64> = self
             .used
@@ -562,13 +572,12 @@ fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize)
                 }
             }
             // The best shape of each combination of effects leads on.
-            let glances =
-                sets.par_iter().map(|(set, parent)| balance.glance(alternatives, set, parent)).collect();
-            let best = best_shapes(alternatives, glances, SHAPES);
-            let refit = |near: &Solved| {
-                let chosen: Vec<&Alternative> = near.set.iter().map(|a| &alternatives[*a]).collect();
-                Solved { set: near.set.clone(), ..balance.solve_near(&chosen, Some(near)) }
+            let glance = |(set, parent): &(Vec<usize>, &Solved)| {
+                balance.solve_set(alternatives, set, Some(*parent), 1)
             };
+            let refit =
+                |near: &Solved| balance.solve_set(alternatives, &near.set, Some(near), MOST_ITERATIONS);
+            let best = best_shapes(alternatives, sets.par_iter().map(glance).collect(), SHAPES);
             let solved = best_shapes(alternatives, best.par_iter().map(refit).collect(), 1);
             parents = solved.iter().take(3).cloned().collect();
             let best =
@@ -632,6 +641,26 @@ mod tests {
         let solved = balance.solve(&[], &[]);
         balance.refit_noise(&solved);
         assert!((balance.deviation[ROWS / 2] - 3.0).abs() < 0.2, "{}", balance.deviation[ROWS / 2]);
+    }
+
+    #[test]
+    fn noise_slower_than_the_filter_is_beyond_the_named_one_unless_it_may_be_a_ripple() {
+        // Of three widths of the filter, so that a stretch of 64 has ten of it and a parabola takes three.
+        let kept = f64::exp(-1.0 / 3.0);
+        let slow = white(ROWS, 5).into_iter().scan(0.0, |slow, new| {
+            *slow = kept * *slow + (1.0 - kept * kept).sqrt() * new;
+            Some(*slow)
+        });
+        // As large behind the filter as what is named, one, and twice that.
+        let passed = (2.0 * std::f64::consts::PI.sqrt()).sqrt();
+        let quick = white(ROWS, 6).into_iter().map(|n| passed * n);
+        let both: Vec<f64> = slow.zip(quick.clone()).map(|(slow, quick)| 2.0 * slow + quick).collect();
+        let over = |values: &Vec<f64>| balance(filters::gaussian(values, 1.0, 0));
+        let [white, both] = [&quick.collect(), &both].map(over);
+        assert!(white.quiet_over_named_noise() < 1.1, "{}", white.quiet_over_named_noise());
+        assert!(both.quiet_over_named_noise() > 1.4, "{}", both.quiet_over_named_noise());
+        let alone = Balance { rests: false, ..both };
+        assert_eq!(alone.quiet_over_named_noise(), 1.0);
     }
 
     #[test]

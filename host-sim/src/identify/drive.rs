@@ -5,8 +5,6 @@
 //! Every term goes through one Gaussian, whose derivatives give ω and ω̇ from the angle; it is as narrow as the angle's
 //! noise allows. Rows near standstill are left out: there the bearing's friction is a reaction.
 
-use std::ops::Range;
-
 use super::balance::{Alternative, Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
@@ -283,11 +281,6 @@ impl Bearing {
         Self::new(balance.all_but_inertia(&solved, forms), &solved.p, scales)
     }
 
-    /// The same for a part of the points.
-    pub fn of_points(&self, points: Range<usize>) -> Self {
-        Self { torque_nm: self.torque_nm[points].to_vec(), ..*self }
-    }
-
     /// Coulomb's and viscous friction at a speed.
     pub fn friction_nm(&self, speed_rad_s: f64) -> f64 {
         self.coulomb_nm * (speed_rad_s / self.turning_rad_s).clamp(-1.0, 1.0)
@@ -376,7 +369,8 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         base.push((wide("friction_zero", 0.0, deviation), concat(&|log| vec![-1.0; log.len()])));
     }
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, contact, scales)).collect();
-    Balance::new(concat(&response), base, &rows, scales.effort)
+    // A drive alone is looked at for its ripple.
+    Balance { rests: contact, ..Balance::new(concat(&response), base, &rows, scales.effort) }
         .with_sensors(SENSORS, prior.bridge_zero.unwrap_or(0.0))
 }
 

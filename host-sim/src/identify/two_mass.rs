@@ -49,8 +49,13 @@ fn judged(numbers: &Coupling, log: &DriveLog) -> f64 {
     PULL.min((std::f64::consts::TAU * numbers.mode_hz * log.grid.step_s).powi(2))
 }
 
-/// Shaft torque and angle of the disc for a log.
-fn shaft_torque(log: &DriveLog, law: &Law, bearing: &Bearing, pull: f64) -> (Vec<f64>, Vec<f64>) {
+/// Shaft torque and angle of the disc for a log, which begins at this point of all.
+fn shaft_torque(
+    (log, from): (&DriveLog, usize),
+    law: &Law,
+    bearing: &Bearing,
+    pull: f64,
+) -> (Vec<f64>, Vec<f64>) {
     let n = log.len();
     let dt = log.grid.step_s;
     let (disc, omega, k) = (law.disc_inertia, law.omega_rad_s, law.stiffness);
@@ -61,10 +66,11 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &Bearing, pull: f64) -> (Vec
     let friction = log.friction.as_ref().unwrap_or(&free);
     let [effort, acceleration] = &log.quick;
     let on_disc = law.bearing_on_disc;
+    let bearing_nm = &bearing.torque_nm[from..from + n];
     let observed: Vec<f64> = effort
         .iter()
         .zip(acceleration)
-        .zip(&bearing.torque_nm)
+        .zip(bearing_nm)
         .map(|((t, a), b)| t - law.motor_inertia * a - (1.0 - on_disc) * b)
         .collect();
     // No smaller than what noise makes: inside the gap the torque is nothing.
@@ -79,7 +85,7 @@ fn shaft_torque(log: &DriveLog, law: &Law, bearing: &Bearing, pull: f64) -> (Vec
         let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
         let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
         // What the bearing makes beside the friction that follows the disc's speed.
-        let borne = on_disc * (bearing.torque_nm[i] - bearing.friction_nm(log.speed[i]));
+        let borne = on_disc * (bearing_nm[i] - bearing.friction_nm(log.speed[i]));
         for s in 0..substeps {
             // Drift, kick, drift: motor and disc are seen at the same instant, in the middle of the step.
             let part = (s as f64 + 0.5) / substeps as f64;
@@ -135,8 +141,8 @@ fn alternative(
     let mut added = Vec::with_capacity(view.balance.response.len());
     let mut from = 0;
     for log in view.logs {
-        let bearing = bearing.of_points(from..from + log.len());
-        let (torque, _) = shaft_torque(log, &law, &bearing, pull);
+        let (torque, _) = shaft_torque((log, from), &law, bearing, pull);
+        let bearing_nm = &bearing.torque_nm[from..from + log.len()];
         from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
@@ -145,8 +151,7 @@ fn alternative(
             .enumerate()
             .map(|(i, t)| {
                 // Of what the disc bears the friction stands in the response, and the bearing beside it.
-                friction.map_or(0.0, |f| f[i]) + law.bearing_on_disc * bearing.torque_nm[i]
-                    - t.clamp(-most, most)
+                friction.map_or(0.0, |f| f[i]) + law.bearing_on_disc * bearing_nm[i] - t.clamp(-most, most)
             })
             .collect();
         if change.iter().any(|x| !x.is_finite()) {
@@ -282,9 +287,7 @@ fn reckoned(
     let logs: Vec<(&DriveLog, usize)> = view.logs.iter().zip(starts).collect();
     let law = numbers.law(view.inertia, view.scales.effort);
     let angles = |pull: f64| -> Vec<Vec<f64>> {
-        let of = |(log, from): &(&DriveLog, usize)| {
-            shaft_torque(log, &law, &bearing.of_points(*from..*from + log.len()), pull).1
-        };
+        let of = |log: &(&DriveLog, usize)| shaft_torque(*log, &law, bearing, pull).1;
         logs.iter().map(of).collect()
     };
     if let Some(disc) = &mut form.disc {
@@ -497,7 +500,7 @@ mod tests {
             // The torque is the same; how much of it follows the disc's speed is not.
             let torque_nm = drive::direction(&logs[0], scales.speed).iter().map(|s| coulomb * s).collect();
             let bearing = Bearing::new(torque_nm, &[0.0, coulomb_nm, 0.0], &scales);
-            let (shaft, _) = shaft_torque(&logs[0], &law, &bearing, 0.01);
+            let (shaft, _) = shaft_torque((&logs[0], 0), &law, &bearing, 0.01);
             let [effort, acceleration] = &logs[0].quick;
             let rest: Vec<f64> = (0..shaft.len())
                 .map(|i| effort[i] - law.motor_inertia * acceleration[i] - shaft[i])
