@@ -1,20 +1,23 @@
 //! The contact, searched, and what the drive's causes and the channels' ends change in the other balances.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::balance::Alternative;
 use super::contact::baseline;
 use super::contact::change::{Change, ContactTerm};
-use super::contact::channel::{before_ringing, error_nm};
+use super::contact::channel::{before_ringing, error_nm, normal_error_n};
 use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
-use super::contact::search;
+use super::contact::search::{self, Ranked};
 use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales, TIME};
 use super::effects::{ContactView, LIBRARY};
+use super::heard::{ChannelError, Heard, Teller};
 use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
+use super::linear;
 use super::linear_part::Linear;
 use super::rest::{Contribution, Ground};
-use super::table::{Candidate, LOG_PRIOR};
+use super::table::{Candidate, LOG_PRIOR, Part};
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 
@@ -22,7 +25,7 @@ use crate::files::rig_file::RigFile;
 /// are: their subsets stand in the table too.
 const OUT_OF_QUESTION: f64 = 60.0;
 
-/// Sets with a cause that the drive denies that stay in the comparison.
+/// Sets with a cause that a motor's balance denies that stay in the comparison.
 const DENIED: usize = 3;
 
 /// The contact, searched.
@@ -40,9 +43,11 @@ pub struct ContactPart {
     /// Noise as refitted.
     pub noise: Noise,
     /// Sets, best first.
-    pub ranked: Vec<search::Ranked>,
+    pub ranked: Vec<Ranked>,
     /// Of each set, what each of its terms does.
     pub contributions: Vec<Vec<Contribution>>,
+    /// Effects that change a channel, each where the best set has it.
+    tellers: Vec<Teller>,
     /// The drive's cause that moves the contact otherwise than the encoder says.
     pub disc_cause: Option<DiscCause>,
 }
@@ -74,8 +79,9 @@ impl ContactPart {
         let mut problem = Problem::new(&logs, &baseline, &terms);
         let ranked = search::search(&mut problem, &[], progress).ranked;
         let contributions = contributions(&problem, &ranked);
+        let tellers = tellers(&problem, &ranked);
         let noise = problem.noise.clone();
-        Self { logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }
+        Self { tellers, logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }
     }
 
     /// What the likeliest set changes whose causes are all large enough to be told.
@@ -84,17 +90,24 @@ impl ContactPart {
         self.problem().change(&best.terms, &best.p)
     }
 
-    /// Searched again without causes that the drive denies; the best sets that have one stay in the comparison.
+    /// Searched again without causes that the balances which hear of them deny; the best sets that have one stay in the
+    /// comparison.
     #[must_use]
-    pub fn without(self, denied: &[&str], progress: &(dyn Fn(&str) + Sync)) -> Self {
+    pub fn without(self, denied: &[(Part, &str)], progress: &(dyn Fn(&str) + Sync)) -> Self {
+        let is_denied = |term: &usize| {
+            let term = &self.terms[*term];
+            denied.contains(&(term.heard_by(), term.effect))
+        };
+        let denied: Vec<usize> = (0..self.terms.len()).filter(is_denied).collect();
         let mut problem = Problem::new(&self.logs, &self.baseline, &self.terms);
-        let found = search::search(&mut problem, denied, progress).ranked;
-        let with_denied = |fit: &Fit| fit.terms.iter().any(|term| denied.contains(&self.terms[*term].effect));
+        let found = search::search(&mut problem, &denied, progress).ranked;
+        let with_denied = |fit: &Fit| fit.terms.iter().any(|term| denied.contains(term));
         let before = self.ranked.iter().map(|r| &r.fit).filter(|fit| with_denied(fit)).take(DENIED).cloned();
         let ranked = search::beside(&problem, found, before.collect());
         let contributions = contributions(&problem, &ranked);
+        let tellers = tellers(&problem, &ranked);
         let noise = problem.noise.clone();
-        Self { noise, ranked, contributions, ..self }
+        Self { noise, ranked, contributions, tellers, ..self }
     }
 
     /// What a candidate changes.
@@ -110,24 +123,10 @@ impl ContactPart {
 
     /// What an effect changes in a candidate, and the contact's numbers there.
     pub fn change_by(&self, place: usize, effect: &str) -> Option<(Change, Numbers)> {
-        Some((self.change_in(&self.terms, place, effect)?, self.baseline.numbers(&self.fit(place).p)))
-    }
-
-    /// What an effect changes, with the values of a candidate, in the logs that these terms were made for.
-    fn change_in(&self, terms: &[ContactTerm], place: usize, effect: &str) -> Option<Change> {
         let fit = self.fit(place);
-        let mut at = self.baseline.free.len();
-        for own in fit.terms.iter().map(|t| &self.terms[*t]) {
-            let values = &fit.p[at..at + own.parameters.len()];
-            if own.effect == effect {
-                let term = terms.iter().find(|term| term.effect == own.effect && term.form == own.form)?;
-                let mut change = Change::default();
-                (term.act)(values, &mut change);
-                return Some(change);
-            }
-            at += own.parameters.len();
-        }
-        None
+        let (term, values) =
+            placed(&self.terms, &self.baseline, fit).find(|(term, _)| term.effect == effect)?;
+        Some((term.change(values), self.baseline.numbers(&fit.p)))
     }
 
     /// Effects of a candidate.
@@ -135,33 +134,38 @@ impl ContactPart {
         self.fit(place).terms.iter().map(|term| self.terms[*term].effect)
     }
 
-    /// What the friction channel shows too much by each effect that changes it, as the best set with the effect says: N m,
-    /// log by log, for these logs.
-    pub fn channel_errors(&self, logs: &[ContactLog], training: bool) -> Vec<(&'static str, Vec<Vec<f64>>)> {
+    /// What another balance hears of the effects that change a channel, for these logs.
+    pub fn heard(&self, by: Part, logs: &[ContactLog], training: bool) -> Vec<Heard> {
         let own = (!training).then(|| contact_terms(logs, &self.scales, false, self.logs.len(), self.block));
         let terms = own.as_ref().unwrap_or(&self.terms);
-        let mut out: Vec<(&'static str, Vec<Vec<f64>>)> = Vec::new();
-        for place in 0..self.ranked.len() {
-            for effect in self.effects(place) {
-                if out.iter().all(|(known, _)| *known != effect) {
-                    let change = self.change_in(terms, place, effect);
-                    let error = change.and_then(|change| error_nm(logs, &change));
-                    out.extend(error.map(|error| (effect, error)));
-                }
-            }
-        }
-        out
+        let of_teller = |teller: &Teller| {
+            let form = placed(&self.terms, &self.baseline, self.fit(teller.place))
+                .find(|(term, _)| term.effect == teller.effect)
+                .map(|(term, _)| term.form)?;
+            let same = |term: &&ContactTerm| term.effect == teller.effect && term.form == form;
+            let term = terms.iter().find(same)?;
+            teller.tell(|values| channel_error(logs, term, values))
+        };
+        self.tellers.iter().filter(|teller| teller.heard_by == by).filter_map(of_teller).collect()
     }
 
-    /// Which of these effects stand together in a set.
-    pub fn together(&self, effects: &[&'static str]) -> Vec<Vec<&'static str>> {
-        let of_set =
-            |place| self.effects(place).filter(|effect| effects.contains(effect)).collect::<Vec<_>>();
-        let mut sets: Vec<Vec<&'static str>> = (0..self.ranked.len()).map(of_set).collect();
-        sets.iter_mut().for_each(|set| set.sort_unstable());
-        sets.sort();
-        sets.dedup();
-        sets
+    /// What each candidate tells another balance.
+    pub fn told_together(&self, by: Part) -> Vec<Vec<&'static str>> {
+        (0..self.ranked.len()).map(|place| self.told(by, place)).collect()
+    }
+
+    /// What a candidate tells another balance.
+    pub fn told(&self, by: Part, place: usize) -> Vec<&'static str> {
+        let teller =
+            |effect: &&'static str| self.tellers.iter().find(|t| t.heard_by == by && t.effect == *effect);
+        let terms = self.fit(place).terms.iter().map(|term| &self.terms[*term]);
+        let told = terms
+            .filter(|term| term.heard_by() == by)
+            .map(|term| term.effect)
+            .filter(|e| teller(e).is_some());
+        let mut told: Vec<&'static str> = told.collect();
+        told.sort_unstable();
+        told
     }
 
     /// The fit of a candidate.
@@ -188,10 +192,11 @@ impl ContactPart {
             let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
             (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
         };
-        let of_set = |(place, (ranked, contributions)): (usize, (&search::Ranked, &Vec<Contribution>))| {
+        let of_set = |(place, (ranked, contributions)): (usize, (&Ranked, &Vec<Contribution>))| {
             let terms = ranked.fit.terms.iter().map(of_term).zip(contributions);
             let effects = terms.map(|((effect, form), own)| (effect, form, *own));
-            Candidate::new(place, ranked.log_evidence, effects)
+            let tells = [Part::Drive, Part::Pressure].map(|by| (by, self.told(by, place)));
+            Candidate { tells: tells.into(), ..Candidate::new(place, ranked.log_evidence, effects) }
         };
         self.ranked.iter().zip(&self.contributions).enumerate().map(of_set).collect()
     }
@@ -210,15 +215,62 @@ pub fn contact_terms(
     LIBRARY.iter().flat_map(|effect| effect.contact(&view)).collect()
 }
 
-/// What each term of each set does. Without it the others are fitted again where the set is in question.
-fn contributions(problem: &Problem<'_>, ranked: &[search::Ranked]) -> Vec<Vec<Contribution>> {
+/// The terms of a fit, each with its values.
+fn placed<'t>(
+    terms: &'t [ContactTerm],
+    baseline: &Baseline,
+    fit: &'t Fit,
+) -> impl Iterator<Item = (&'t ContactTerm, &'t [f64])> {
+    fit.terms.iter().scan(baseline.free.len(), |at, term| {
+        let term = &terms[*term];
+        let from = std::mem::replace(at, *at + term.parameters.len());
+        Some((term, &fit.p[from..*at]))
+    })
+}
+
+/// What a term with these values has its channel show too much; `None` where it changes none.
+fn channel_error(logs: &[ContactLog], term: &ContactTerm, values: &[f64]) -> Option<ChannelError> {
+    let change = term.change(values);
+    if term.heard_by() == Part::Pressure { normal_error_n(logs, &change) } else { error_nm(logs, &change) }
+}
+
+/// The effects that change a channel, each in the best set that has it.
+fn tellers(problem: &Problem<'_>, ranked: &[Ranked]) -> Vec<Teller> {
+    let mut out: Vec<Teller> = Vec::new();
     let best = ranked.first().map_or(0.0, |r| r.log_evidence);
-    let in_question = |ranked: &&search::Ranked| best - ranked.log_evidence <= OUT_OF_QUESTION;
+    for (place, Ranked { fit, log_evidence }) in ranked.iter().enumerate() {
+        let mut at = problem.baseline.free.len();
+        let mut open = None;
+        for term in fit.terms.iter().map(|term| &problem.terms[*term]) {
+            let own = at..at + term.parameters.len();
+            at = own.end;
+            let (effect, heard_by, values) = (term.effect, term.heard_by(), &fit.p[own.clone()]);
+            let known = out.iter().any(|teller| (teller.effect, teller.heard_by) == (effect, heard_by));
+            if known || !term.changes_channel(values) {
+                continue;
+            }
+            let open = if best - log_evidence <= OUT_OF_QUESTION {
+                let open = open.get_or_insert_with(|| problem.open(fit));
+                let own = open.view((own.start, own.start), (own.len(), own.len()));
+                linear::factor(&own.into_owned()).unpack()
+            } else {
+                DMatrix::zeros(own.len(), 0)
+            };
+            out.push(Teller { effect, heard_by, place, values: values.to_vec(), open });
+        }
+    }
+    out
+}
+
+/// What each term of each set does. Without it the others are fitted again where the set is in question.
+fn contributions(problem: &Problem<'_>, ranked: &[Ranked]) -> Vec<Vec<Contribution>> {
+    let best = ranked.first().map_or(0.0, |r| r.log_evidence);
+    let in_question = |ranked: &&Ranked| best - ranked.log_evidence <= OUT_OF_QUESTION;
     let mut fitted: Vec<&Fit> = ranked.iter().map(|r| &r.fit).collect();
     let subsets = search::subsets(problem, ranked.iter().filter(in_question).map(|r| &r.fit), &fitted);
     fitted.extend(&subsets);
     let ground = Ground::new(problem, &ranked[0].fit);
-    let of_set = |ranked: &search::Ranked| {
+    let of_set = |ranked: &Ranked| {
         let fit = &ranked.fit;
         let without = if in_question(&ranked) {
             search::without_each(problem, fit, &fitted)
@@ -256,8 +308,8 @@ fn with_disc_motion(
 
 /// The fit of the set that is the likeliest with its prior and in which no cause is too small to be told: a channel has an end
 /// where more says so than that nothing is lost by one.
-fn of_largest_posterior<'r>(ranked: &'r [search::Ranked], contributions: &[Vec<Contribution>]) -> &'r Fit {
-    let posterior = |r: &search::Ranked| r.log_evidence + LOG_PRIOR * r.fit.terms.len() as f64;
+fn of_largest_posterior<'r>(ranked: &'r [Ranked], contributions: &[Vec<Contribution>]) -> &'r Fit {
+    let posterior = |r: &Ranked| r.log_evidence + LOG_PRIOR * r.fit.terms.len() as f64;
     let told = ranked.iter().zip(contributions).filter(|(_, all)| all.iter().all(Contribution::is_told));
     let best = told.map(|(r, _)| r).max_by(|a, b| posterior(a).total_cmp(&posterior(b)));
     &best.unwrap_or(&ranked[0]).fit

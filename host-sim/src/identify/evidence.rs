@@ -4,7 +4,7 @@
 //! pull further, so that the optimum is another one: with b the slope and A the curvature of the shared posterior in
 //! deviations of the prior, it is ½ bᵀA⁻¹b higher.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::linear;
 use super::term::Parameter;
@@ -50,16 +50,13 @@ impl Expansion<'_> {
         let sd = |i: usize| self.parameters[i].width(scale);
         let off = |i: usize| (self.p[i] - self.parameters[i].mean) / sd(i);
         let free: Vec<usize> = (0..self.p.len()).filter(|i| self.p[*i] > self.parameters[*i].lower).collect();
-        let curvature = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-            let (i, j) = (free[a], free[b]);
-            share * self.curvature[(i, j)] * sd(i) * sd(j) + f64::from(u8::from(a == b))
-        });
+        let curvature = DMatrix::from_fn(free.len(), free.len(), |a, b| self.curvature[(free[a], free[b])]);
+        let factor = posterior(&curvature, share, &free.iter().map(|i| sd(*i)).collect::<Vec<_>>());
         let slope = DVector::from_fn(free.len(), |a, _| {
             let i = free[a];
             share * self.slope[i] * sd(i) - off(i)
         });
         let prior: f64 = (0..self.p.len()).map(|i| off(i).powi(2)).sum();
-        let factor = linear::factor(&curvature);
         0.5 * slope.dot(&factor.solve(&slope))
             - share * self.misfit
             - 0.5 * prior
@@ -70,10 +67,21 @@ impl Expansion<'_> {
 /// Occam's factor of parameters with normal priors of these deviations, as a logarithm; `curvature` is that of −ln likelihood,
 /// which counts with a share.
 pub fn log_occam(curvature: &DMatrix<f64>, share: f64, sd: &[f64]) -> f64 {
-    let scaled = DMatrix::from_fn(sd.len(), sd.len(), |a, b| {
+    -0.5 * linear::log_determinant(&posterior(curvature, share, sd))
+}
+
+/// Covariance of parameters with normal priors of these deviations; `curvature` is that of −ln likelihood, which counts with a
+/// share.
+pub fn covariance(curvature: &DMatrix<f64>, share: f64, sd: &[f64]) -> DMatrix<f64> {
+    let inverse = posterior(curvature, share, sd).inverse();
+    DMatrix::from_fn(sd.len(), sd.len(), |a, b| inverse[(a, b)] * sd[a] * sd[b])
+}
+
+/// Factor of the posterior's curvature in deviations of the prior.
+fn posterior(curvature: &DMatrix<f64>, share: f64, sd: &[f64]) -> Cholesky<f64, Dyn> {
+    linear::factor(&DMatrix::from_fn(sd.len(), sd.len(), |a, b| {
         share * curvature[(a, b)] * sd[a] * sd[b] + f64::from(u8::from(a == b))
-    });
-    -0.5 * linear::log_determinant(&linear::factor(&scaled))
+    }))
 }
 
 /// ln of the mean of exponentials.

@@ -10,6 +10,7 @@ use super::contact::problem::Problem;
 use super::contact_part::{self, ContactPart};
 use super::drive::{self, Bearing, DriveLog, DriveScales};
 use super::effects::{self, DriveView, NormalLoadView};
+use super::heard::Heard;
 use super::judge::Judgement;
 use super::linear_part::{self, Linear};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
@@ -114,7 +115,7 @@ pub fn errors(
         let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
         let change = contact.change(place);
         let sensed = contact_part::behind_channel(&prepared, &change);
-        let told = contact.channel_errors(sensed.as_ref().unwrap_or(&prepared), training);
+        let told = contact.heard(Part::Drive, sensed.as_ref().unwrap_or(&prepared), training);
         let drives: Option<Vec<DriveLog>> = sensed
             .as_ref()
             .unwrap_or(&prepared)
@@ -145,10 +146,10 @@ pub fn errors(
             sensed.as_ref().unwrap_or(&prepared).iter().map(NormalLoadLog::new).collect();
         if let (Some(normal_load), Some(load_logs)) = (&found.normal_load, load_logs) {
             let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
-            out.push((
-                Part::Pressure,
-                normal_load_errors(found, normal_load, &load_logs, &names, rig, training),
-            ));
+            let heard = contact.heard(Part::Pressure, &prepared, training);
+            let told = linear_part::heard_by_normal_load(&heard, &load_logs, rig);
+            let errors = normal_load_errors(found, normal_load, (&load_logs, &names), (rig, told), training);
+            out.push((Part::Pressure, errors));
         }
     } else if let Some(drive) = &found.drive {
         // Through the filter of the training logs.
@@ -288,7 +289,7 @@ fn drive_errors(
     part: &Linear,
     logs: &[DriveLog],
     rig: Option<&RigFile>,
-    told: &[(&'static str, Vec<Vec<f64>>)],
+    told: &[Heard],
     training: bool,
 ) -> Errors {
     let place = found.place(Part::Drive).unwrap_or(0);
@@ -315,7 +316,7 @@ fn drive_alternatives(
     part: &Linear,
     logs: &[DriveLog],
     rig: Option<&RigFile>,
-    told: &[(&'static str, Vec<Vec<f64>>)],
+    told: &[Heard],
 ) -> (Balance, Vec<Alternative>) {
     let prior = rig.map(linear_part::drive_prior).unwrap_or_default();
     let scales = DriveScales::new(logs);
@@ -347,8 +348,9 @@ fn drive_alternatives(
     let (couplings, others): (Vec<&Alternative>, Vec<&Alternative>) =
         chosen.into_iter().partition(|own| own.is_coupling());
     let mut fixed: Vec<Alternative> = others.into_iter().flat_map(|own| known(own, None)).collect();
-    let told = told.iter().filter(|(effect, _)| heard.iter().any(|own| own.effect == *effect));
-    fixed.extend(told.map(|(effect, error_nm)| linear_part::told(effect, logs, error_nm)));
+    if !heard.is_empty() {
+        fixed.extend(linear_part::heard_by_drive(told, logs));
+    }
     if !couplings.is_empty() {
         // What is in the shaft is the motor's torque less its inertia and what else bears on it.
         let mut torque_nm = vec![0.0; balance.response.len()];
@@ -367,9 +369,8 @@ fn drive_alternatives(
 fn normal_load_errors(
     found: &Judgement,
     part: &Linear,
-    logs: &[NormalLoadLog],
-    names: &[String],
-    rig: &RigFile,
+    (logs, names): (&[NormalLoadLog], &[String]),
+    (rig, told): (&RigFile, Vec<Alternative>),
     training: bool,
 ) -> Errors {
     let place = found.place(Part::Pressure).unwrap_or(0);
@@ -387,9 +388,8 @@ fn normal_load_errors(
     let scales = part.normal_load_scales.as_ref().unwrap_or(&own_scales);
     let balance = normal_load::balance(logs, rig, scales);
     let solved = &part.solved[place];
-    let mut fixed = Vec::new();
-    for chosen in &solved.set {
-        let own = &part.alternatives[*chosen];
+    let mut fixed = told;
+    for own in solved.set.iter().map(|chosen| &part.alternatives[*chosen]).filter(|own| !own.told) {
         let view = NormalLoadView {
             logs,
             scales,

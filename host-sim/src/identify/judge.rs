@@ -69,29 +69,16 @@ pub fn judge(
         progress("drive");
         Found { drive: Some(of_drive_logs(train, !linear_stage)?), ..Found::default() }
     };
-    let Found { contact, drive, mut notes } = found;
+    let Found { contact, drive, normal_load, mut notes } = found;
     let drive = with_rows(drive, Part::Drive, "the drive", &mut notes);
+    let normal_load = with_rows(normal_load, Part::Pressure, "the normal-load actuator", &mut notes);
     let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
     if let Some(contact) = &contact {
         parts.push((Part::Friction, contact.candidates()));
     }
-    if let Some(drive) = &drive {
-        parts.push((Part::Drive, drive.candidates()));
-    }
-    let mut normal_load = None;
-    if let Some(contact) = &contact {
-        if contact.logs.iter().all(|log| log.m1_torque_nm.is_some()) {
-            progress("normal-load actuator");
-        }
-        // Of these logs the answer of contact and drive says where the normal channel shows its end.
-        let place = table(&parts).0[0].place(Part::Friction).unwrap_or(0);
-        let seen = contact_part::without_normal_end(&contact.logs, &contact.change(place));
-        let found = of_normal_load(seen.as_ref().unwrap_or(&contact.logs), rig, &mut notes);
-        normal_load = with_rows(found, Part::Pressure, "the normal-load actuator", &mut notes);
-    }
-    if let Some(normal_load) = &normal_load {
-        parts.push((Part::Pressure, normal_load.candidates()));
-    }
+    let linear = [(Part::Drive, &drive), (Part::Pressure, &normal_load)];
+    let searched = linear.into_iter().filter_map(|(part, found)| Some((part, found.as_ref()?.candidates())));
+    parts.extend(searched);
     notes.extend(contact.as_ref().and_then(|contact| contact.noise.unresolved()));
     if contact.as_ref().is_some_and(rest::nothing_is_known) {
         notes.push(
@@ -122,6 +109,7 @@ pub fn judge(
 struct Found {
     contact: Option<ContactPart>,
     drive: Option<Linear>,
+    normal_load: Option<Linear>,
     notes: Vec<String>,
 }
 
@@ -137,16 +125,71 @@ fn with_rows(linear: Option<Linear>, part: Part, what: &str, notes: &mut Vec<Str
     linear.filter(has_rows)
 }
 
-/// The normal-load actuator; `None` where M1's torque is not logged.
-fn of_normal_load(logs: &[ContactLog], rig: &RigFile, notes: &mut Vec<String>) -> Option<Linear> {
-    let logs: Option<Vec<NormalLoadLog>> = logs.iter().map(NormalLoadLog::new).collect();
-    if logs.is_none() {
-        notes.push("no torque of M1: the normal-load actuator is not looked at".to_string());
-    }
-    Some(linear_part::search_normal_load(&logs?, rig))
+/// What the motors' balances make of what the contact says of its channels.
+struct Motors<'r> {
+    rig: &'r RigFile,
+    drive: Option<Linear>,
+    normal_load: Option<Linear>,
+    /// Whether the drive was searched on logs that the contact's answer changes.
+    behind_channel: bool,
+    /// The same of the normal-load actuator, which is searched last.
+    without_end: Option<bool>,
 }
 
-/// Contact and drive. What the contact says of the channels changes what the drive sees.
+impl Motors<'_> {
+    fn search_drive(rig: &RigFile, logs: &[ContactLog]) -> Option<Linear> {
+        let logs = Self::drive_logs(rig, logs)?;
+        Some(linear_part::search_drive(&logs, &linear_part::drive_prior(rig), true))
+    }
+
+    fn drive_logs(rig: &RigFile, logs: &[ContactLog]) -> Option<Vec<DriveLog>> {
+        logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect()
+    }
+
+    /// Hears of the channels what the contact says, and forgets what it said before. A balance is searched again where its logs
+    /// change.
+    fn hear(&mut self, contact: &ContactPart, progress: &(dyn Fn(&str) + Sync)) {
+        let rig = self.rig;
+        let seen = contact_part::behind_channel(&contact.logs, &contact.best_change());
+        let before = std::mem::replace(&mut self.behind_channel, seen.is_some());
+        let logs = seen.as_ref().unwrap_or(&contact.logs);
+        if before || seen.is_some() {
+            self.drive = Self::search_drive(rig, logs);
+        }
+        if let (Some(drive), Some(logs)) = (&mut self.drive, Self::drive_logs(rig, logs)) {
+            drive.forget();
+            let heard = contact.heard(Part::Drive, &contact.logs, true);
+            drive.tell(linear_part::heard_by_drive(&heard, &logs), contact.told_together(Part::Drive));
+        }
+        // Of these logs the answer of contact and drive says where the normal channel shows its end.
+        let drive = self.drive.iter().map(|drive| (Part::Drive, drive.candidates()));
+        let parts: Vec<_> = std::iter::once((Part::Friction, contact.candidates())).chain(drive).collect();
+        let place = table(&parts).0[0].place(Part::Friction).unwrap_or(0);
+        let seen = contact_part::without_normal_end(&contact.logs, &contact.change(place));
+        let before = self.without_end.replace(seen.is_some());
+        let logs = seen.as_ref().unwrap_or(&contact.logs).iter().map(NormalLoadLog::new);
+        let Some(logs) = logs.collect::<Option<Vec<NormalLoadLog>>>() else { return };
+        if before.is_none() || before == Some(true) || seen.is_some() {
+            progress("normal-load actuator");
+            self.normal_load = Some(linear_part::search_normal_load(&logs, rig));
+        }
+        if let Some(normal_load) = &mut self.normal_load {
+            normal_load.forget();
+            let heard = contact.heard(Part::Pressure, &contact.logs, true);
+            let forms = linear_part::heard_by_normal_load(&heard, &logs, rig);
+            normal_load.tell(forms, contact.told_together(Part::Pressure));
+        }
+    }
+
+    /// What the balances deny of the contact's best set.
+    fn denied(&self, contact: &ContactPart) -> Vec<(Part, &'static str)> {
+        let linear = [(Part::Drive, &self.drive), (Part::Pressure, &self.normal_load)];
+        let denied = |(part, linear): (Part, &Option<Linear>)| Some(linear.as_ref()?.denied(part, contact));
+        linear.into_iter().filter_map(denied).flatten().collect()
+    }
+}
+
+/// Contact, drive and normal-load actuator. What the contact says of the channels changes what the motors see.
 fn of_contact_logs(
     train: &[Log],
     rig: &RigFile,
@@ -154,45 +197,24 @@ fn of_contact_logs(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Found, InputError> {
     let logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
-    let drive_logs = |logs: &[ContactLog]| -> Option<Vec<DriveLog>> {
-        logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect()
-    };
-    let of_drive = |logs: &[ContactLog]| -> Option<Linear> {
-        Some(linear_part::search_drive(&drive_logs(logs)?, &linear_part::drive_prior(rig), true))
-    };
     let mut notes: Vec<String> = train.iter().filter_map(speed_note).collect();
     progress("drive");
-    let mut drive = of_drive(&logs);
-    if drive.is_none() {
-        notes.push("no torque of M2: the drive is not looked at".to_string());
-    }
+    let drive = Motors::search_drive(rig, &logs);
     let mut contact = ContactPart::searched(logs, (model, rig), drive.as_ref(), progress);
-    let mut seen = contact_part::behind_channel(&contact.logs, &contact.best_change());
-    if let Some(seen) = &seen {
-        drive = of_drive(seen);
+    let mut motors = Motors { rig, drive, normal_load: None, behind_channel: false, without_end: None };
+    motors.hear(&contact, progress);
+    let denied = motors.denied(&contact);
+    if !denied.is_empty() {
+        contact = contact.without(&denied, progress);
+        motors.hear(&contact, progress);
     }
-    if let (Some(of_motor), Some(logs)) = (&mut drive, drive_logs(seen.as_ref().unwrap_or(&contact.logs))) {
-        of_motor.tell(&logs, &contact);
-        let denied = of_motor.denied(&contact);
-        if !denied.is_empty() {
-            contact = contact.without(&denied, progress);
-            // What the channel was thought to do with the causes that are denied is to be forgotten with them.
-            let before = std::mem::replace(
-                &mut seen,
-                contact_part::behind_channel(&contact.logs, &contact.best_change()),
-            );
-            let sees = seen.as_ref().unwrap_or(&contact.logs);
-            if before.is_some() || seen.is_some() {
-                drive = of_drive(sees);
-            } else {
-                of_motor.forget();
-            }
-            if let (Some(drive), Some(logs)) = (&mut drive, drive_logs(sees)) {
-                drive.tell(&logs, &contact);
-            }
+    let Motors { drive, normal_load, .. } = motors;
+    for (found, of) in [(&drive, "M2: the drive"), (&normal_load, "M1: the normal-load actuator")] {
+        if found.is_none() {
+            notes.push(format!("no torque of {of} is not looked at"));
         }
     }
-    Ok(Found { contact: Some(contact), drive, notes })
+    Ok(Found { contact: Some(contact), drive, normal_load, notes })
 }
 
 /// What is said of a log whose speed is not used.

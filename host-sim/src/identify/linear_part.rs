@@ -7,11 +7,11 @@ use super::bridge_zero;
 use super::contact_part::ContactPart;
 use super::drive::{self, DriveLog, DrivePrior, DriveScales};
 use super::effects::{DriveView, LIBRARY, NormalLoadView};
+use super::heard::{ChannelError, Heard};
 use super::law_form::LAW_FORM;
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
 use super::rest::{self, Contribution, Rest};
-use super::table::{Candidate, LOG_PRIOR, MOST_CAUSES};
-use super::term::Parameter;
+use super::table::{Candidate, LOG_PRIOR, MOST_CAUSES, Part};
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
 use crate::input_error::InputError;
@@ -57,16 +57,16 @@ impl Linear {
         told
     }
 
-    /// Effects of the contact's best set whose errors of the friction channel cost more here than another cause would: the
-    /// motor's torque does not know of them.
-    pub fn denied(&self, contact: &ContactPart) -> Vec<&'static str> {
+    /// Effects of the contact's best set whose errors of a channel cost more here than another cause would: the motor's torque
+    /// does not know of them.
+    pub fn denied(&self, part: Part, contact: &ContactPart) -> Vec<(Part, &'static str)> {
         let best = |told: &[&str]| {
             let own = self.solved.iter().filter(|solved| self.told(solved) == told);
             own.map(|solved| solved.log_evidence).fold(f64::NEG_INFINITY, f64::max)
         };
         let nothing = best(&[]);
-        let tells = |effect: &&'static str| self.alternatives.iter().any(|a| a.told && a.effect == *effect);
-        contact.effects(0).filter(tells).filter(|effect| best(&[*effect]) < nothing + LOG_PRIOR).collect()
+        let costs = |effect: &&'static str| best(&[*effect]) < nothing + LOG_PRIOR;
+        contact.told(part, 0).into_iter().filter(costs).map(|effect| (part, effect)).collect()
     }
 
     /// Takes back what the contact has told.
@@ -77,16 +77,18 @@ impl Linear {
         self.alternatives.retain(|a| !a.told);
     }
 
-    /// Adds the sets in which the friction channel is as the contact's sets say that it is. What the channel shows too much is
-    /// no torque: where a set of the contact has such an error, the drive has it too, and by the same numbers.
-    pub fn tell(&mut self, logs: &[DriveLog], contact: &ContactPart) {
-        let errors = contact.channel_errors(&contact.logs, true);
+    /// Adds the sets in which a channel is as the contact's sets say that it is. What the channel shows too much is no torque:
+    /// where a set of the contact has such an error, the motor's balance has it too, and by the same numbers. These are the
+    /// forms of what is heard, and which of it stands together in a set.
+    pub fn tell(&mut self, forms: Vec<Alternative>, mut together: Vec<Vec<&'static str>>) {
         let from = self.alternatives.len();
-        self.alternatives.extend(errors.iter().map(|(effect, error_nm)| told(effect, logs, error_nm)));
-        let effects: Vec<&'static str> = errors.iter().map(|(effect, _)| *effect).collect();
+        let effects: Vec<&'static str> = forms.iter().map(|form| form.effect).collect();
+        self.alternatives.extend(forms);
         let place = |effect: &&'static str| from + effects.iter().position(|e| e == effect).unwrap_or(0);
+        together.sort();
+        together.dedup();
         let mut sets: Vec<Vec<usize>> = Vec::new();
-        for together in contact.together(&effects).iter().filter(|together| !together.is_empty()) {
+        for together in together.iter().filter(|together| !together.is_empty()) {
             for own in self.solved.iter().enumerate().filter(wanted).map(|(_, solved)| &solved.set) {
                 let apart = own.iter().all(|a| !together.contains(&self.alternatives[*a].effect));
                 if apart && own.len() + together.len() <= MOST_CAUSES {
@@ -148,17 +150,21 @@ fn wanted((place, solved): &(usize, &Solved)) -> bool {
     *place < CANDIDATES || solved.set.len() < 2
 }
 
-/// An error of the friction channel as the contact's balance tells it, which is known there as well as a law is.
-pub fn told(effect: &'static str, logs: &[DriveLog], error_nm: &[Vec<f64>]) -> Alternative {
-    let error: Vec<f64> = logs.iter().zip(error_nm).flat_map(|(log, error)| log.filtered(error)).collect();
-    let more = Parameter { amplitude: false, ..Parameter::amplitude("told_too_small", LAW_FORM) };
-    let column = error.iter().map(|e| -e).collect();
-    Alternative {
-        form: "as the contact tells it".into(),
-        response: Some(error),
-        told: true,
-        ..Alternative::columns(effect, vec![more], vec![column])
-    }
+/// What the drive makes of what the contact says of the friction channel.
+pub fn heard_by_drive(heard: &[Heard], logs: &[DriveLog]) -> Vec<Alternative> {
+    let filtered = |error_nm: &ChannelError| -> Vec<f64> {
+        logs.iter().zip(error_nm).flat_map(|(log, error_nm)| log.filtered(error_nm)).collect()
+    };
+    heard.iter().map(|heard| heard.form(filtered)).collect()
+}
+
+/// What the normal-load actuator makes of what the contact says of the normal channel.
+pub fn heard_by_normal_load(heard: &[Heard], logs: &[NormalLoadLog], rig: &RigFile) -> Vec<Alternative> {
+    let torque = |error_n: &ChannelError| -> Vec<f64> {
+        let of_log = |(log, error_n): (&NormalLoadLog, &Vec<f64>)| log.filtered(error_n);
+        logs.iter().zip(error_n).flat_map(of_log).map(|n| n / rig.lever_gain_n_per_nm).collect()
+    };
+    heard.iter().map(|heard| heard.form(torque)).collect()
 }
 
 /// The drive's balance of these logs, searched.
@@ -236,6 +242,7 @@ mod tests {
     use super::*;
     use crate::identify::balance::LogRows;
     use crate::identify::noise::tests::white;
+    use crate::identify::term::Parameter;
 
     const ROWS: usize = 4000;
 
@@ -267,20 +274,36 @@ mod tests {
         (balance, [log])
     }
 
+    /// What a drive gains by an error that it hears of, and the values of the form.
+    fn heard(shown_nm: &[f64], error_nm: &[f64], open_nm: &[&[f64]]) -> (f64, Vec<f64>) {
+        let (balance, logs) = drive(shown_nm, 1.0);
+        let open = open_nm.iter().map(|open_nm| vec![open_nm.to_vec()]).collect();
+        let heard = [Heard { effect: "channel", error: vec![error_nm.to_vec()], open }];
+        let form = &heard_by_drive(&heard, &logs)[0];
+        let [none, with] = [&[][..], &[form]].map(|forms| balance.solve_forms(forms));
+        (with.log_evidence - none.log_evidence, with.p[1..].to_vec())
+    }
+
     #[test]
     fn an_error_that_is_told_is_as_large_as_it_is_told_or_costs_evidence() {
         let error_nm: Vec<f64> = (0..ROWS).map(|i| 0.3 * (0.004 * i as f64).cos()).collect();
-        let gain = |factor: f64| {
-            let (balance, logs) = drive(&error_nm, factor);
-            let form = told("channel", &logs, std::slice::from_ref(&error_nm));
-            let [none, with] = [&[][..], &[&form]].map(|forms| balance.solve_forms(forms));
-            (with.log_evidence - none.log_evidence, with.p[1])
-        };
+        let times = |factor: f64| error_nm.iter().map(|e| factor * e).collect::<Vec<f64>>();
         // The channel shows what the motor does not bear, and so by a tenth less; the motor bears it all.
         for factor in [1.0, 0.9] {
-            let (gained, off) = gain(factor);
-            assert!(gained > -LOG_PRIOR && (off - (factor - 1.0)).abs() < 0.01, "{factor}: {gained} {off}");
+            let (gained, p) = heard(&times(factor), &error_nm, &[]);
+            assert!(gained > -LOG_PRIOR && (p[0] - (factor - 1.0)).abs() < 0.01, "{factor}: {gained} {p:?}");
         }
-        assert!(gain(0.0).0 < LOG_PRIOR, "{}", gain(0.0).0);
+        let (gained, _) = heard(&times(0.0), &error_nm, &[]);
+        assert!(gained < LOG_PRIOR, "{gained}");
+    }
+
+    #[test]
+    fn a_course_that_the_contact_leaves_open_is_found_where_the_motor_bears_it() {
+        let error_nm: Vec<f64> = (0..ROWS).map(|i| 0.3 * (0.004 * i as f64).cos()).collect();
+        let open_nm: Vec<f64> = (0..ROWS).map(|i| 0.05 * (0.007 * i as f64).sin()).collect();
+        let shown_nm: Vec<f64> = error_nm.iter().zip(&open_nm).map(|(e, open)| e - 1.5 * open).collect();
+        let (closed, _) = heard(&shown_nm, &error_nm, &[]);
+        let (gained, p) = heard(&shown_nm, &error_nm, &[&open_nm]);
+        assert!(gained > closed - LOG_PRIOR && (p[1] + 1.5).abs() < 0.05, "{gained} {closed} {p:?}");
     }
 }

@@ -19,6 +19,7 @@ pub mod fit_parameters;
 mod fit_profile;
 mod fit_simulated;
 pub mod grid;
+pub mod heard;
 pub mod holdout;
 pub mod judge;
 mod law_form;

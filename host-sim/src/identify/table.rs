@@ -55,6 +55,8 @@ pub struct Candidate {
     pub forms: Vec<f64>,
     /// Effects that are here what another balance says that they are.
     pub told: Vec<&'static str>,
+    /// What this set tells each other balance of its effects.
+    pub tells: Vec<(Part, Vec<&'static str>)>,
 }
 
 impl Candidate {
@@ -74,7 +76,14 @@ impl Candidate {
             contributions: effects.iter().map(|e| e.2).collect(),
             forms: effects.iter().map(|e| e.1).collect(),
             told: Vec::new(),
+            tells: Vec::new(),
         }
+    }
+
+    /// Whether what a set of another balance hears is what this one tells it.
+    fn is_heard_by(&self, part: Part, other: &Self) -> bool {
+        let told = self.tells.iter().find(|(to, _)| *to == part).map_or(&[][..], |(_, told)| told);
+        told == other.told
     }
 }
 
@@ -147,9 +156,7 @@ fn within<'c>(parts: &'c [(Part, Vec<Candidate>)], effects: &[&str]) -> Option<V
     for candidate in own.iter().filter(allowed) {
         let mut chosen = vec![(*first, candidate)];
         for (part, candidates) in others {
-            let tells = |effect: &&str| candidates.iter().any(|c| c.told.contains(effect));
-            let told: Vec<&str> = candidate.effects.iter().copied().filter(tells).collect();
-            let heard = candidates.iter().filter(allowed).filter(|c| c.told == told);
+            let heard = candidates.iter().filter(allowed).filter(|c| candidate.is_heard_by(*part, c));
             let best = heard.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
             chosen.extend(best.map(|c| (*part, c)));
         }
@@ -262,6 +269,7 @@ mod tests {
                     .to_vec(),
                 forms: vec![LAW_FORM; effects.len()],
                 told: Vec::new(),
+                tells: Vec::new(),
             };
             let candidates = vec![candidate(&["a", "b"], 50.0, 0), candidate(&["a"], 0.0, 1)];
             table(&[(Part::Friction, candidates)]).0[0].clone()
@@ -281,27 +289,34 @@ mod tests {
     }
 
     #[test]
-    fn what_the_contact_says_of_its_channel_is_so_in_the_drive() {
-        // Two causes explain the contact as well as each other; one of them is an error of its channel.
+    fn what_the_contact_says_of_its_channel_is_so_in_the_balance_that_hears_of_it() {
+        // Two causes explain the contact as well as each other; one of them is an error of the channel that M1 bears.
         let candidate = |place, effects: &[&'static str], log_evidence: f64, told: &[&'static str]| {
             let large = Contribution { size: 0.1, over_rest: 9.0, known: MODEL_FORM };
             let named = effects.iter().map(|effect| (*effect, LAW_FORM, large));
             Candidate { told: told.to_vec(), ..Candidate::new(place, log_evidence, named) }
         };
-        let of_drive = |with_error: f64| {
+        let found = |with_error: f64| {
             let contact = vec![
-                candidate(0, &["channel"], 501.0, &[]),
+                Candidate {
+                    tells: vec![(Part::Drive, Vec::new()), (Part::Pressure, vec!["channel"])],
+                    ..candidate(0, &["channel"], 501.0, &[])
+                },
                 candidate(1, &["law"], 500.0, &[]),
                 candidate(2, &[], 0.0, &[]),
             ];
-            let drive =
-                vec![candidate(0, &[], 0.0, &[]), candidate(1, &["channel"], with_error, &["channel"])];
-            let best = table(&[(Part::Friction, contact), (Part::Drive, drive)]).0[0].clone();
-            (best.effects, best.places[1].1)
+            let heard = |with_error: f64| {
+                vec![candidate(0, &[], 0.0, &[]), candidate(1, &["channel"], with_error, &["channel"])]
+            };
+            // The drive has heard of the same effect as an error of its own channel: that is another one.
+            let parts =
+                [(Part::Friction, contact), (Part::Drive, heard(900.0)), (Part::Pressure, heard(with_error))];
+            let best = table(&parts).0[0].clone();
+            (best.effects, best.places[1].1, best.places[2].1)
         };
-        // The drive says which of the two it is, and what is named stands in it.
-        assert_eq!(of_drive(-300.0), (vec!["law"], 0));
-        assert_eq!(of_drive(300.0), (vec!["channel"], 1));
+        // M1 says which of the two it is, and what is named stands in it.
+        assert_eq!(found(-300.0), (vec!["law"], 0, 0));
+        assert_eq!(found(300.0), (vec!["channel"], 0, 1));
     }
 
     #[test]

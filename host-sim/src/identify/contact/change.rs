@@ -2,6 +2,7 @@
 
 use super::law::Ageing;
 use super::problem::Numbers;
+use crate::identify::table::Part;
 use crate::identify::term::{Column, Parameter, Starts};
 
 /// Changes to the contact and its sensor; several effects add up.
@@ -36,6 +37,11 @@ pub struct Change {
 }
 
 impl Change {
+    /// Whether it changes the friction channel's amplifier or its lateness.
+    pub fn changes_friction_channel(&self) -> bool {
+        self.zero_nm.is_some() || self.gain.is_some() || self.late_s != 0.0
+    }
+
     /// Adds `size` times a column to the logarithm of friction.
     pub fn add_log_factor(&mut self, columns: &[Column], sizes: &[f64]) {
         add(&mut self.log_factor, columns, sizes);
@@ -163,6 +169,24 @@ impl ContactTerm {
     pub fn as_error_of(mut self, bridge: Bridge) -> Self {
         self.error_of = Some(bridge);
         self
+    }
+
+    /// What it changes with these values.
+    pub fn change(&self, values: &[f64]) -> Change {
+        let mut change = Change::default();
+        (self.act)(values, &mut change);
+        change
+    }
+
+    /// Whether what it changes with these values is what a channel shows: amplifier or lateness of that of friction, or all that
+    /// the other one is taken for.
+    pub fn changes_channel(&self, values: &[f64]) -> bool {
+        self.heard_by() == Part::Pressure || self.change(values).changes_friction_channel()
+    }
+
+    /// The balance that hears of what it changes in a channel: that of the motor which bears what the bridge shows.
+    pub fn heard_by(&self) -> Part {
+        if self.error_of == Some(Bridge::Normal) { Part::Pressure } else { Part::Drive }
     }
 
     /// As a law that is fitted once another form of its effect leads.

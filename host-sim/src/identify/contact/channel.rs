@@ -42,9 +42,18 @@ pub fn before_ringing(shown: &[f64], mode: (f64, f64), step_s: f64) -> Option<Ve
 /// What a change adds to the torque that the friction channel of each log shows, N m; `None` where it changes neither its
 /// amplifier nor its lateness.
 pub fn error_nm(logs: &[ContactLog], change: &Change) -> Option<Vec<Vec<f64>>> {
-    let changed = change.zero_nm.is_some() || change.gain.is_some() || change.late_s != 0.0;
     let of_log = |(at, log)| Channel::of_effects(log, at, change).error_nm();
-    changed.then(|| logs.iter().enumerate().map(of_log).collect())
+    change.changes_friction_channel().then(|| logs.iter().enumerate().map(of_log).collect())
+}
+
+/// What the normal channel of each log shows too much, N, where what a change does to friction is an error of that channel;
+/// `None` where it does nothing.
+pub fn normal_error_n(logs: &[ContactLog], change: &Change) -> Option<Vec<Vec<f64>>> {
+    let log_factor = change.log_factor.as_ref()?;
+    let of_log = |(log, factor): (&ContactLog, &Vec<f64>)| {
+        log.normal_n.iter().zip(factor).map(|(shown, m)| -shown * m.exp_m1()).collect()
+    };
+    Some(logs.iter().zip(log_factor).map(of_log).collect())
 }
 
 /// The channel.
@@ -281,6 +290,18 @@ mod tests {
             error_nm(&[log(series(torque))], &Change { mode: Some((80.0, 0.1)), ..Change::default() })
                 .is_none()
         );
+    }
+
+    #[test]
+    fn a_normal_channel_that_shows_too_much_makes_friction_look_too_small() {
+        // Of 80 N it shows a twentieth and 2 N more by and by.
+        let acted = 80.0;
+        let shown = |i: f64| acted + (0.05 * acted + 2.0) * i / COUNT as f64;
+        let log = ContactLog { normal_n: series(shown), ..log(vec![0.0; COUNT]) };
+        let factor = series(|i| (acted / shown(i)).ln());
+        let change = Change { log_factor: Some(vec![factor]), ..Change::default() };
+        let error = normal_error_n(&[log], &change).expect("it has one");
+        assert!(off(&error[0], &series(|i| shown(i) - acted)) < 1e-9);
     }
 
     #[test]

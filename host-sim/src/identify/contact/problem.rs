@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::change::{Change, ContactTerm};
@@ -16,7 +16,7 @@ use super::log::ContactLog;
 pub use super::noise::Noise;
 use super::observer::{Drive, Observed, SLIP_NOISES, observe};
 use super::struck_mode::innovations;
-use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE};
+use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE, covariance};
 use crate::identify::filters::{exponentials, rms};
 use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
@@ -589,11 +589,8 @@ impl<'a> Problem<'a> {
     /// ln ∫ likelihood^share · prior by Laplace's method, averaged over the scale of the amplitudes: the whole evidence, and
     /// that with [`CONTACT_SHARE`].
     pub fn log_evidence(&self, fit: &Fit) -> [f64; 2] {
-        let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
         let each = || fit.r.iter().zip(self.noise.counts());
-        let weights: Vec<f64> =
-            each().map(|(r, counts)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
-        let (h, g) = normal_equations(&j, &weights, &fit.r);
+        let (h, g) = self.curvature(fit);
         let parameters: Vec<&Parameter> = self.parameters(&fit.terms).collect();
         let misfit: f64 = each().map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p()).sum();
         let at = Expansion {
@@ -604,6 +601,21 @@ impl<'a> Problem<'a> {
             curvature: &h,
         };
         [1.0, CONTACT_SHARE].map(|share| at.log_evidence(share, |_| 0.0))
+    }
+
+    /// What a fit leaves open of its values, the likelihood with its share: their covariance.
+    pub fn open(&self, fit: &Fit) -> DMatrix<f64> {
+        let sd: Vec<f64> = self.parameters(&fit.terms).map(|q| q.width(TYPICAL_SCALE)).collect();
+        covariance(&self.curvature(fit).0, CONTACT_SHARE, &sd)
+    }
+
+    /// Curvature of −ln likelihood at a fit, and the slope of ln likelihood.
+    fn curvature(&self, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
+        let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
+        let each = fit.r.iter().zip(self.noise.counts());
+        let weights: Vec<f64> =
+            each.map(|(r, counts)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
+        normal_equations(&j, &weights, &fit.r)
     }
 }
 

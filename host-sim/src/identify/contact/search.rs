@@ -117,8 +117,8 @@ pub struct Found {
     pub ranked: Vec<Ranked>,
 }
 
-/// Searches for causes but these.
-pub fn search(problem: &mut Problem<'_>, denied: &[&str], progress: &(dyn Fn(&str) + Sync)) -> Found {
+/// Searches for causes in other forms than these.
+pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&str) + Sync)) -> Found {
     let base = baseline(problem);
     progress("single causes");
     let (singles, known) = singles(problem, denied, &base);
@@ -246,7 +246,7 @@ fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]
 }
 
 /// The best single terms, and for each nonlinear one the points where it stood after a few iterations.
-fn singles(problem: &Problem<'_>, denied: &[&str], base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>) {
+fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>) {
     let slopes = problem.slopes(&[], &base.p, &base.r);
     let first = |terms: Vec<usize>| -> Vec<Fit> {
         let starts: Vec<(usize, Vec<f64>)> = terms
@@ -258,7 +258,7 @@ fn singles(problem: &Problem<'_>, denied: &[&str], base: &Fit) -> (Vec<Fit>, Vec
             .map(|(term, start)| problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Some(&slopes)))
             .collect()
     };
-    let wanted = |term: &usize| !problem.terms[*term].law && !denied.contains(&problem.terms[*term].effect);
+    let wanted = |term: &usize| !problem.terms[*term].law && !denied.contains(term);
     let forms = (0..problem.terms.len()).filter(wanted).collect();
     let tried = first(forms);
     let mut known: Vec<Option<Points>> = vec![None; problem.terms.len()];
@@ -325,7 +325,7 @@ fn bent(problem: &Problem<'_>, mut fits: Vec<Fit>) -> Vec<Fit> {
 /// Linearised gain in evidence of each term beside a fit, with the values at which it starts.
 fn table(
     problem: &Problem<'_>,
-    denied: &[&str],
+    denied: &[usize],
     parent: &Fit,
     slopes: &Slopes,
     known: &[Option<Points>],
@@ -333,11 +333,9 @@ fn table(
 ) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
     let w = problem.weights(&parent.r);
-    let has = |effect: &str| {
-        denied.contains(&effect) || parent.terms.iter().any(|t| problem.terms[*t].effect == effect)
-    };
+    let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
     let others: Vec<usize> = (0..problem.terms.len())
-        .filter(|t| !problem.terms[*t].law && !has(problem.terms[*t].effect))
+        .filter(|t| !problem.terms[*t].law && !denied.contains(t) && !has(problem.terms[*t].effect))
         .collect();
     // Columns of each other term, and the points that they stand for where it is not linear.
     let blocks: Vec<(Vec<Vec<f64>>, Points)> = others
@@ -423,7 +421,7 @@ fn table(
     out
 }
 
-fn children(problem: &Problem<'_>, denied: &[&str], parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
+fn children(problem: &Problem<'_>, denied: &[usize], parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
     let slopes: Vec<Slopes> =
         parents.iter().map(|parent| problem.slopes(&parent.terms, &parent.p, &parent.r)).collect();
     let mut candidates: Vec<(f64, Vec<usize>, (&Slopes, Points))> = Vec::new();
