@@ -19,7 +19,10 @@ use super::filters::{self, deviation_by_median, local_maximum, median_magnitude}
 use super::linear;
 use super::noise;
 use super::same_amplitude::{Seen, log_ratio};
+use super::slow_noise;
 use super::term::Parameter;
+use super::variance_components::{self, Sample};
+use super::whitening::Whitening;
 
 /// The disc where it does not move as the motor does.
 #[derive(Debug, Clone)]
@@ -110,6 +113,8 @@ pub struct Balance {
     pub deviation: Vec<f64>,
     /// Deviation of each row before it was refitted: from named sources alone.
     pub first_deviation: Vec<f64>,
+    /// Squares of the sources at each point, point after point, and the least factor of each.
+    pub(super) sources: (Vec<f64>, Vec<f64>),
     /// Rows that take part.
     pub used: Vec<usize>,
     /// Usual size of the torques whose sum the response is: what errors of form are relative to.
@@ -118,6 +123,8 @@ pub struct Balance {
     pub bridge_zero: f64,
     /// Rows that count as one.
     pub temper: f64,
+    /// What is new in each row.
+    pub(super) whitening: Whitening,
     /// Width of the widest log's filter, samples.
     pub filter_samples: f64,
     /// Whether the response has quiet stretches; what may ripple all the time has none.
@@ -136,8 +143,10 @@ pub struct LogRows<'l> {
     pub step_s: f64,
     /// Points at which the balance says nothing.
     pub left_out: Vec<bool>,
-    /// Deviations from each named source at a point.
+    /// Deviations at a point from each source that is known.
     pub noise: Box<dyn Fn(usize) -> Vec<f64> + 'l>,
+    /// The same from each source that is guessed: how large it is the residuals tell.
+    pub guessed: Box<dyn Fn(usize) -> Vec<f64> + 'l>,
 }
 
 /// Rows are taken every so many samples for each width of the filter: closer ones say the same.
@@ -212,11 +221,17 @@ impl Balance {
     ) -> Self {
         let (mut deviation, mut used, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         let mut row_step_s = f64::INFINITY;
+        let (mut sources, mut least) = (Vec::new(), Vec::new());
         for log in logs {
             let (from, count) = (deviation.len(), log.left_out.len());
             starts.push(from);
-            let whole = |i| (log.noise)(i).iter().map(|n| n * n).sum::<f64>().sqrt().max(1e-12);
-            deviation.extend((0..count).map(whole));
+            for i in 0..count {
+                let (known, guessed) = ((log.noise)(i), (log.guessed)(i));
+                least = [vec![1.0; known.len()], vec![variance_components::LEAST; guessed.len()]].concat();
+                let squares: Vec<f64> = known.iter().chain(&guessed).map(|n| n * n).collect();
+                deviation.push(squares.iter().sum::<f64>().sqrt().max(1e-12));
+                sources.extend(squares);
+            }
             let marked: Vec<f64> = log.left_out.iter().map(|out| f64::from(u8::from(*out))).collect();
             let near = local_maximum(&marked, (CLEAR_WIDTHS * log.width).ceil() as usize);
             let every = (ROWS_PER_WIDTH * log.width).round().max(1.0) as usize;
@@ -226,21 +241,33 @@ impl Balance {
             used.extend(rows.filter(|i| near[*i] == 0.0).map(|i| from + i));
         }
         let first_deviation = deviation.clone();
-        Self {
+        let mut balance = Self {
             response,
             sensors: base.len(),
             base,
             deviation,
             first_deviation,
+            sources: (sources, least),
             used,
             scale,
             bridge_zero: 0.0,
             temper: FIRST_TEMPER,
+            whitening: Whitening::default(),
             filter_samples: logs.iter().map(|log| log.width).fold(1.0, f64::max),
             rests: true,
             row_step_s,
             starts,
-        }
+        };
+        balance.whiten(0.0);
+        balance
+    }
+
+    /// Takes the rows' deviations, and slow processes of this variance beside them.
+    fn whiten(&mut self, of_each: f64) {
+        let logs = self.rows_of_logs();
+        let between = |rows: &Vec<usize>| rows.windows(2).map(|pair| pair[1] - pair[0]).min();
+        let step = logs.iter().filter_map(between).min().unwrap_or(1);
+        self.whitening = Whitening::new(&logs, step, &self.deviation, of_each);
     }
 
     /// With the base's parameters from this place on as errors of the sensors, and the deviation of its bridge's zero.
@@ -330,13 +357,11 @@ impl Balance {
         parameters.extend(chosen.iter().flat_map(|a| a.parameters.iter().cloned()));
         let columns: Vec<&Vec<f64>> = base.chain(chosen.iter().flat_map(|a| a.columns.iter())).collect();
 
-        let y: Vec<f64> = self.used.iter().map(|&i| response[i] / self.deviation[i]).collect();
-        let x: Vec<Vec<f64>> =
-            columns.iter().map(|c| self.used.iter().map(|&i| c[i] / self.deviation[i]).collect()).collect();
+        let y = self.whitening.of(&response);
+        let x: Vec<Vec<f64>> = columns.iter().map(|c| self.whitening.of(c)).collect();
         let n = parameters.len();
         let weight = |r: f64| (FREEDOM + 1.0) / (FREEDOM + r * r);
-        let of_near =
-            |near: &Solved| self.used.iter().map(|&i| weight(near.residual[i] / self.deviation[i])).collect();
+        let of_near = |near: &Solved| self.whitening.of(&near.residual).into_iter().map(weight).collect();
         let mut w: Vec<f64> = near.map_or_else(|| vec![1.0; y.len()], of_near);
         let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
         let mut r = y.clone();
@@ -458,27 +483,57 @@ impl Balance {
         (sum / self.used.len().max(1) as f64).sqrt()
     }
 
-    /// Takes noise level and effective sample size from the residuals of a solved set.
+    /// Takes the noise from the residuals of a solved set: the level of what is slow, that of what is new in each row, and the
+    /// effective sample size.
     pub fn refit_noise(&mut self, solved: &Solved) {
-        let r = |i: &usize| solved.residual[*i] / self.deviation[*i];
+        let logs = self.rows_of_logs();
+        let of_rows = |of: &[f64]| -> Vec<f64> { logs.iter().flatten().map(|i| of[*i]).collect() };
+        let lengths: Vec<usize> = logs.iter().map(Vec::len).collect();
+        let [residual, deviation] = [&solved.residual, &self.deviation].map(|of| of_rows(of));
+        let errors = slow_noise::Errors { residual: &residual, deviation: &deviation, lengths: &lengths };
+        let of_each = errors.likeliest_of_decade();
+        self.whiten(of_each);
+        self.refit_sources(solved);
+        self.refit_level(solved, of_each);
+    }
+
+    /// Takes the size of each guessed source from what a solved set leaves new in each row.
+    fn refit_sources(&mut self, solved: &Solved) {
+        let (sources, least) = &self.sources;
+        let of_row = |((point, deviation), new): ((usize, f64), f64)| Sample {
+            sources: &sources[point * least.len()..][..least.len()],
+            square: (new * deviation).powi(2),
+            besides: (deviation * deviation - self.deviation[point].powi(2)).max(0.0),
+        };
+        let new = self.whitening.of(&solved.residual);
+        let samples: Vec<Sample<'_>> = self.whitening.rows().zip(new).map(of_row).collect();
+        let typical =
+            samples.iter().map(|s| s.sources.iter().sum::<f64>()).sum::<f64>() / samples.len().max(1) as f64;
+        let factors = variance_components::fitted(&samples, least, typical);
+        for (deviation, squares) in self.deviation.iter_mut().zip(sources.chunks(least.len())) {
+            let variance: f64 = squares.iter().zip(&factors).map(|(n, a)| n * a).sum();
+            *deviation = variance.sqrt().max(1e-12);
+        }
+    }
+
+    /// The same beside slow processes of this variance.
+    fn refit_level(&mut self, solved: &Solved, of_each: f64) {
+        self.whiten(of_each);
+        let new = self.whitening.of(&solved.residual);
         // Not below the sensors' noise: where most rows rest, the angle's noise is not in them, and a deviation taken from them
         // makes outliers of those that move.
-        let factor = deviation_by_median(self.used.iter().map(r)).max(1.0);
-        let pull: Vec<f64> = self
-            .used
-            .iter()
-            .map(|i| {
-                let r = r(i) / factor;
-                r * (FREEDOM + 1.0) / (FREEDOM + r * r)
-            })
-            .collect();
+        let factor = deviation_by_median(new.into_iter()).max(1.0);
         self.deviation.iter_mut().for_each(|d| *d *= factor);
+        self.whiten(of_each);
+        let new = self.whitening.of(&solved.residual);
+        let pull: Vec<f64> = new.iter().map(|r| r * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
         self.temper = slow_share(&pull, self.row_step_s).max(1.0);
     }
 
     /// Takes back what [`Self::refit_noise`] has done.
     fn forget_residuals(&mut self) {
         self.deviation.copy_from_slice(&self.first_deviation);
+        self.whiten(0.0);
         self.temper = FIRST_TEMPER;
     }
 }
@@ -511,7 +566,8 @@ impl<'a> Company<'a> {
 /// to another cause's torque is not the coupling's.
 pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<Alternative>, Vec<Solved>) {
     let alone = balance.solve(&[], &[]);
-    balance.refit_noise(&alone);
+    // What no cause explains yet is no slow noise.
+    balance.refit_level(&alone, 0.0);
     let mut alternatives = propose(balance, Company { forms: &[], residual: &alone.residual }, &|_| true);
     balance.forget_residuals();
     let found = search_sets(balance, &alternatives, most);
@@ -623,8 +679,13 @@ mod tests {
     /// A balance with one base column, a slow swing, and rows whose named deviation is one.
     fn balance(response: Vec<f64>) -> Balance {
         let column = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
-        let log =
-            LogRows { width: 1.0, step_s: 1e-3, left_out: vec![false; ROWS], noise: Box::new(|_| vec![1.0]) };
+        let log = LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; ROWS],
+            noise: Box::new(|_| vec![1.0]),
+            guessed: Box::new(|_| Vec::new()),
+        };
         Balance::new(response, vec![(Parameter::amplitude("swing", 10.0), column)], &[log], 1.0)
     }
 
@@ -641,6 +702,34 @@ mod tests {
         let solved = balance.solve(&[], &[]);
         balance.refit_noise(&solved);
         assert!((balance.deviation[ROWS / 2] - 3.0).abs() < 0.2, "{}", balance.deviation[ROWS / 2]);
+    }
+
+    #[test]
+    fn what_changes_as_slowly_as_the_noise_tells_as_little() {
+        // White noise with processes of three time constants, and a form that is as slow: three waves over the log.
+        let gained = |seed: u64| {
+            let mut slow = vec![0.0; ROWS];
+            for (at, long) in [30.0, 300.0, 3000.0].into_iter().enumerate() {
+                let kept = f64::exp(-1.0 / long);
+                let mut state = 0.0;
+                for (sum, new) in slow.iter_mut().zip(white(ROWS, 10 * seed + at as u64)) {
+                    state = kept * state + (1.0 - kept * kept).sqrt() * new;
+                    *sum += 0.5 * state;
+                }
+            }
+            let response = slow.iter().zip(white(ROWS, 10 * seed + 9)).map(|(s, n)| s + n).collect();
+            let mut balance = balance(response);
+            let empty = balance.solve(&[], &[]);
+            balance.refit_noise(&empty);
+            let wave = |n: usize| (0..ROWS).map(move |i| (1e-3 * (n * i) as f64).sin()).collect::<Vec<f64>>();
+            let parameters = (0..3).map(|n| Parameter::amplitude(n.to_string(), 2.0)).collect();
+            let form = Alternative::columns("slow", parameters, (1..=3).map(wave).collect());
+            let [none, with] = [&[][..], &[&form][..]].map(|forms| balance.solve_forms(forms).log_evidence);
+            with - none
+        };
+        let gained: Vec<f64> = (1..=8).map(gained).collect();
+        // The prior of a cause asks for 3.9.
+        assert!(gained.iter().all(|g| *g < 2.0), "{gained:?}");
     }
 
     #[test]

@@ -18,6 +18,7 @@ use super::linear;
 use super::linear_part::Linear;
 use super::rest::{Contribution, Ground};
 use super::table::{Candidate, LOG_PRIOR, Part};
+use super::term::Starts;
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
 
@@ -108,6 +109,15 @@ impl ContactPart {
         let tellers = tellers(&problem, &ranked);
         let noise = problem.noise.clone();
         Self { noise, ranked, contributions, tellers, ..self }
+    }
+
+    /// Effects that change the channel which another balance hears of: it has them by what is told here alone.
+    pub fn channel_effects(&self, by: Part) -> Vec<&'static str> {
+        let changes = |term: &&ContactTerm| {
+            let (Starts::At(points) | Starts::BestOf(points, _)) = &term.starts;
+            term.heard_by() == by && points.iter().any(|point| term.changes_channel(point))
+        };
+        self.terms.iter().filter(changes).map(|term| term.effect).collect()
     }
 
     /// What a candidate changes.

@@ -19,8 +19,9 @@ use super::evidence::{BALANCE_SHARE, log_occam};
 
 /// Modes that the balance's filter lets through, Hz.
 const HERTZ: [f64; 2] = [4.0, 150.0];
-/// From a steel shaft's to one beyond which nothing swings.
-const DAMPING_RATIO: [f64; 2] = [0.003, 1.5];
+/// From a steel shaft's to several times a rubber coupling's (relative damping ψ of 0.8 to 1.2, DIN 740, is ζ = ψ/4π): beyond it
+/// nothing swings that would tell a coupling from a lag.
+const DAMPING_RATIO: [f64; 2] = [0.003, 0.5];
 /// Neither motor nor disc is all of the inertia.
 const DISC_SHARE: [f64; 2] = [0.1, 0.9];
 /// From the width of some counts of an encoder to a loose key's.

@@ -8,7 +8,7 @@
 use super::balance::{Alternative, Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
-use super::filters::{gaussian, largest_change, rms, steps, white_share};
+use super::filters::{adaptively_smoothed, gaussian, largest_change, local_maximum, rms, steps, white_share};
 use super::grid::Grid;
 use super::noise;
 use super::term::Parameter;
@@ -31,12 +31,18 @@ const STANDSTILL_NOISES: f64 = 5.0;
 const LEAST_NOISE: f64 = 2e-3;
 /// Share of the filtered change a sample that is not known, since the channels are not sampled at one instant.
 const BETWEEN_SAMPLES: f64 = 0.1;
-/// The channels of a log are sampled within this time of each other, s: a converter's scan.
-const SCAN_S: f64 = 3e-5;
+/// The channels of a log are taken within this share of its step of each other: a converter's scan, and a torque that is computed
+/// after it.
+const WITHIN_A_STEP: f64 = 0.05;
 /// The friction bridge's delay is known within this time by the rig file, s.
 const BRIDGE_LATE_S: f64 = 2e-4;
 /// Gain of the friction channel is known within 0.5 %.
 const GAIN: f64 = 5e-3;
+/// Noise of the bridge that is slower than from sample to sample is as large as that: a deviation of both together.
+const SLOWER_TOO: f64 = 2.0;
+/// A torque rests where it stays within so many deviations of its noise over so many samples about a point.
+const RESTS_WITHIN: f64 = 4.0;
+const SMOOTHED_OVER: usize = 32;
 /// Names of the base parameters' places.
 pub const INERTIA: usize = 0;
 /// Place of the Coulomb torque.
@@ -59,6 +65,9 @@ pub struct DriveLog {
     pub position: Vec<f64>,
     /// Friction torque on the disc, taken ahead by its sensor's delay; `None` where nothing is pressed.
     pub friction: Option<Vec<f64>>,
+    /// What of it is the bridge's noise where the torque rests; 0 where it does not. The motor's torque knows nothing of that, and a
+    /// coupling that let less of it through would look better for it: the base may leave it out too.
+    pub friction_noise: Option<Vec<f64>>,
     /// Normal force.
     pub load_n: Option<Vec<f64>>,
     /// Points that take part.
@@ -121,6 +130,7 @@ impl DriveLog {
         inertia: f64,
     ) -> Self {
         let contact = friction.is_some();
+        let friction_noise = friction.as_ref().map(|f| noise_at_rest(f, deviation_of(contact, f)));
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
         let (angle_noise, effort_noise) = (deviation_of(contact, &position), deviation_of(contact, &effort));
         let inertial =
@@ -149,6 +159,7 @@ impl DriveLog {
             effort,
             position,
             friction,
+            friction_noise,
             load_n,
             usable,
             speed,
@@ -205,6 +216,17 @@ fn curvature_passed(width: f64, contact: bool) -> f64 {
 /// all the time, so that only what changes from sample to sample counts.
 fn deviation_of(contact: bool, values: &[f64]) -> f64 {
     if contact { noise::standard_deviation(values) } else { noise::difference_deviation(values) }
+}
+
+/// What of a torque is noise where it rests: its difference to itself smoothed, where that changes within a few deviations of the
+/// noise as far as it was smoothed over; 0 elsewhere.
+fn noise_at_rest(torque: &[f64], deviation: f64) -> Vec<f64> {
+    let smooth = adaptively_smoothed(torque, SLOWER_TOO * deviation);
+    let below: Vec<f64> = smooth.iter().map(|x| -x).collect();
+    let range = local_maximum(&smooth, SMOOTHED_OVER).into_iter().zip(local_maximum(&below, SMOOTHED_OVER));
+    let rests = range.map(|(most, least)| most + least < RESTS_WITHIN * deviation);
+    let noise = torque.iter().zip(&smooth).map(|(x, smooth)| x - smooth);
+    noise.zip(rests).map(|(noise, rests)| if rests { noise } else { 0.0 }).collect()
 }
 
 /// Usual sizes over the training logs.
@@ -325,6 +347,7 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         ..Parameter::amplitude(name, sd)
     };
     let (v, own) = (scales.speed, scales.own);
+    let interval_s = logs.iter().map(|log| log.grid.interval_s()).fold(0.0, f64::max);
     let acceleration = concat(&|log| log.acceleration.clone());
     let usual_acceleration = rms(&acceleration).max(1e-12);
     let mut base = vec![
@@ -356,7 +379,7 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
             concat(&|log| log.speed.clone()),
         ),
         (
-            wide("effort_late_s", 0.0, SCAN_S),
+            wide("effort_late_s", 0.0, WITHIN_A_STEP * interval_s),
             concat(&|log| rate(log, &log.effort).iter().map(|d| -d).collect()),
         ),
     ];
@@ -364,6 +387,11 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         let friction = |log: &DriveLog| log.friction.clone().unwrap_or_else(|| vec![0.0; log.len()]);
         base.push((wide("friction_late_s", 0.0, BRIDGE_LATE_S), concat(&|log| rate(log, &friction(log)))));
         base.push((wide("friction_gain", 0.0, GAIN), concat(&|log| log.filtered(&friction(log)))));
+        let noise = |log: &DriveLog| -> Vec<f64> {
+            let of_bridge = log.friction_noise.iter().flatten().map(|noise| -noise);
+            log.filtered(&of_bridge.collect::<Vec<f64>>())
+        };
+        base.push((wide("friction_noise_share", 0.0, 1.0), concat(&noise)));
     }
     if let Some(deviation) = prior.bridge_zero {
         base.push((wide("friction_zero", 0.0, deviation), concat(&|log| vec![-1.0; log.len()])));
@@ -387,17 +415,24 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let white = deviation_of(contact, &log.effort)
         .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
     let (white, form) = (white * white_share(log.width), LEAST_NOISE * scales.own);
-    let noise = move |i: usize| {
+    let noise = move |_| vec![white, log.inertial_noise, form];
+    let guessed = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
         let folded = folded * swings[i].hypot(friction_swings[i]);
-        vec![white, log.inertial_noise, form, between.0, between.1, folded]
+        vec![between.0, between.1, folded]
     };
     // What the derivative of a Gaussian lets through of white noise.
     let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
     let speed_noise = deviation_of(contact, &log.position) * passes / log.grid.step_s;
     let standstill = (STANDSTILL * scales.speed).max(STANDSTILL_NOISES * speed_noise);
     let left_out = log.speed.iter().zip(&log.usable).map(|(v, used)| v.abs() < standstill || !used).collect();
-    LogRows { width: log.width, step_s: log.grid.step_s, left_out, noise: Box::new(noise) }
+    LogRows {
+        width: log.width,
+        step_s: log.grid.step_s,
+        left_out,
+        noise: Box::new(noise),
+        guessed: Box::new(guessed),
+    }
 }
 
 #[cfg(test)]
@@ -443,6 +478,47 @@ mod tests {
             "{of_effort} {of_acceleration}"
         );
         assert!(passed(&log.acceleration, 2e-3 * omega * omega) < 0.6);
+    }
+
+    #[test]
+    fn a_coupling_that_would_let_less_noise_of_the_bridge_through_is_no_better_for_it() {
+        const COUNT: usize = 8000;
+        let time: Vec<f64> = (0..COUNT).map(|i| 1e-3 * i as f64).collect();
+        let turns = |t: f64| 6.0 * (0.5 * t).sin();
+        let torque = |t: f64| 2.0 * (turns(t) / 0.2).tanh();
+        let [of_motor, of_bridge] = [3, 4].map(|seed| noise::tests::white(COUNT, seed));
+        let effort = time.iter().zip(&of_motor).map(|(t, n)| torque(*t) + 0.06 * (0.5 * t).cos() + 0.005 * n);
+        let friction: Vec<f64> = time.iter().zip(&of_bridge).map(|(t, n)| torque(*t) + 0.05 * n).collect();
+        let position = time.iter().map(|t| -12.0 * (0.5 * t).cos()).collect();
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        let load = Some(vec![80.0; COUNT]);
+        let log = DriveLog::made(
+            "log".into(),
+            grid,
+            effort.collect(),
+            position,
+            Some(friction),
+            load,
+            usable,
+            0.02,
+        );
+        // What a soft shaft would take off what swings.
+        let friction = log.friction.clone().unwrap();
+        let kept = 0.9;
+        let softened = friction.iter().scan(friction[0], |state, f| {
+            *state = kept * *state + (1.0 - kept) * f;
+            Some(*state)
+        });
+        let less: Vec<f64> = friction.iter().zip(softened).map(|(f, soft)| f - soft).collect();
+        let logs = [log];
+        let balance = balance(&logs, &DrivePrior::default(), &DriveScales::new(&logs));
+        let soft = Alternative {
+            response: Some(logs[0].filtered(&less)),
+            ..Alternative::columns("shaft_torsion", Vec::new(), Vec::new())
+        };
+        let [none, with] = [&[][..], &[&soft][..]].map(|forms| balance.solve_forms(forms).log_evidence);
+        assert!(with < none + 1.0, "{with} {none}");
     }
 
     #[test]

@@ -159,7 +159,11 @@ impl Motors<'_> {
         if let (Some(drive), Some(logs)) = (&mut self.drive, Self::drive_logs(rig, logs)) {
             drive.forget();
             let heard = contact.heard(Part::Drive, &contact.logs, true);
-            drive.tell(linear_part::heard_by_drive(&heard, &logs), contact.told_together(Part::Drive));
+            drive.tell(
+                linear_part::heard_by_drive(&heard, &logs),
+                contact.told_together(Part::Drive),
+                contact.channel_effects(Part::Drive),
+            );
         }
         // Of these logs the answer of contact and drive says where the normal channel shows its end.
         let drive = self.drive.iter().map(|drive| (Part::Drive, drive.candidates()));
@@ -177,7 +181,11 @@ impl Motors<'_> {
             normal_load.forget();
             let heard = contact.heard(Part::Pressure, &contact.logs, true);
             let forms = linear_part::heard_by_normal_load(&heard, &logs, rig);
-            normal_load.tell(forms, contact.told_together(Part::Pressure));
+            normal_load.tell(
+                forms,
+                contact.told_together(Part::Pressure),
+                contact.channel_effects(Part::Pressure),
+            );
         }
     }
 
@@ -310,6 +318,9 @@ impl Judgement {
                 out.push((part, linear.rest(place)));
             }
         }
+        // What is left where nothing acts is weighed against what is explained elsewhere.
+        let most = out.iter().map(|(_, rest)| rest.explained).fold(0.0, f64::max);
+        out.iter_mut().filter(|(_, rest)| rest.explained == 0.0).for_each(|(_, rest)| rest.elsewhere = most);
         out
     }
 

@@ -35,18 +35,27 @@ pub struct Linear {
     pub drive_scales: Option<DriveScales>,
     /// Scales of the normal-load actuator's columns.
     pub normal_load_scales: Option<NormalLoadScales>,
+    /// Effects of which the contact tells: its channel is what that one says, and nothing else.
+    heard: Vec<&'static str>,
 }
 
 impl Linear {
     /// The best sets and all single causes, for the table.
     pub fn candidates(&self) -> Vec<Candidate> {
-        let wanted = |own: &(usize, &Solved)| wanted(own) || !self.told(own.1).is_empty();
+        let wanted =
+            |own: &(usize, &Solved)| self.admits(own.1) && (wanted(own) || !self.told(own.1).is_empty());
         let of_set = |(place, solved): (usize, &Solved)| {
             let names = solved.set.iter().map(|a| self.alternatives[*a].effect);
             let effects = names.zip(self.contributions(solved)).map(|(effect, own)| (effect, LAW_FORM, own));
             Candidate { told: self.told(solved), ..Candidate::new(place, solved.log_evidence, effects) }
         };
         self.solved.iter().enumerate().filter(wanted).map(of_set).collect()
+    }
+
+    /// Whether a set says of a channel nothing but what is heard of it.
+    fn admits(&self, solved: &Solved) -> bool {
+        let mut own = solved.set.iter().map(|a| &self.alternatives[*a]).filter(|a| !a.told);
+        own.all(|a| !self.heard.contains(&a.effect))
     }
 
     /// Effects of a set that are told by another balance.
@@ -61,7 +70,7 @@ impl Linear {
     /// does not know of them.
     pub fn denied(&self, part: Part, contact: &ContactPart) -> Vec<(Part, &'static str)> {
         let best = |told: &[&str]| {
-            let own = self.solved.iter().filter(|solved| self.told(solved) == told);
+            let own = self.solved.iter().filter(|solved| self.admits(solved) && self.told(solved) == told);
             own.map(|solved| solved.log_evidence).fold(f64::NEG_INFINITY, f64::max)
         };
         let nothing = best(&[]);
@@ -75,15 +84,22 @@ impl Linear {
         let mut told = told.into_iter();
         self.solved.retain(|_| !told.next().unwrap_or(false));
         self.alternatives.retain(|a| !a.told);
+        self.heard.clear();
     }
 
     /// Adds the sets in which a channel is as the contact's sets say that it is. What the channel shows too much is no torque:
     /// where a set of the contact has such an error, the motor's balance has it too, and by the same numbers. These are the
-    /// forms of what is heard, and which of it stands together in a set.
-    pub fn tell(&mut self, forms: Vec<Alternative>, mut together: Vec<Vec<&'static str>>) {
+    /// forms of what is heard, which of it stands together in a set, and all effects of which it is the contact that tells.
+    pub fn tell(
+        &mut self,
+        forms: Vec<Alternative>,
+        mut together: Vec<Vec<&'static str>>,
+        heard: Vec<&'static str>,
+    ) {
         let from = self.alternatives.len();
         let effects: Vec<&'static str> = forms.iter().map(|form| form.effect).collect();
         self.alternatives.extend(forms);
+        self.heard = heard;
         let place = |effect: &&'static str| from + effects.iter().position(|e| e == effect).unwrap_or(0);
         together.sort();
         together.dedup();
@@ -150,12 +166,16 @@ fn wanted((place, solved): &(usize, &Solved)) -> bool {
     *place < CANDIDATES || solved.set.len() < 2
 }
 
-/// What the drive makes of what the contact says of the friction channel.
+/// What the drive makes of what the contact says of the friction channel. The noise of that bridge stands in both balances: what
+/// the contact leaves open is not left open here, or the drive would find the same noise once more and confirm it.
 pub fn heard_by_drive(heard: &[Heard], logs: &[DriveLog]) -> Vec<Alternative> {
     let filtered = |error_nm: &ChannelError| -> Vec<f64> {
         logs.iter().zip(error_nm).flat_map(|(log, error_nm)| log.filtered(error_nm)).collect()
     };
-    heard.iter().map(|heard| heard.form(filtered)).collect()
+    heard
+        .iter()
+        .map(|heard| Heard { open: Vec::new(), error: heard.error.clone(), ..*heard }.form(filtered))
+        .collect()
 }
 
 /// What the normal-load actuator makes of what the contact says of the normal channel.
@@ -194,6 +214,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
         unit: if rotary { "N m" } else { "N" },
         drive_scales: Some(scales),
         normal_load_scales: None,
+        heard: Vec::new(),
     }
 }
 
@@ -234,6 +255,7 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
         unit: "N m",
         drive_scales: None,
         normal_load_scales: Some(scales),
+        heard: Vec::new(),
     }
 }
 
@@ -268,6 +290,7 @@ mod tests {
             step_s: 1e-3,
             left_out: vec![false; ROWS],
             noise: Box::new(|_| vec![0.01]),
+            guessed: Box::new(|_| Vec::new()),
         };
         let swing = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
         let balance = Balance::new(response, vec![(Parameter::amplitude("swing", 1.0), swing)], &[rows], 1.0);
@@ -279,7 +302,8 @@ mod tests {
         let (balance, logs) = drive(shown_nm, 1.0);
         let open = open_nm.iter().map(|open_nm| vec![open_nm.to_vec()]).collect();
         let heard = [Heard { effect: "channel", error: vec![error_nm.to_vec()], open }];
-        let form = &heard_by_drive(&heard, &logs)[0];
+        let filtered = |error_nm: &ChannelError| logs[0].filtered(&error_nm[0]);
+        let form = &heard[0].form(filtered);
         let [none, with] = [&[][..], &[form]].map(|forms| balance.solve_forms(forms));
         (with.log_evidence - none.log_evidence, with.p[1..].to_vec())
     }

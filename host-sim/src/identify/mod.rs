@@ -36,3 +36,5 @@ pub mod spectrum;
 pub mod table;
 pub mod term;
 pub mod two_mass;
+mod variance_components;
+mod whitening;

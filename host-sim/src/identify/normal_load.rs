@@ -193,12 +193,11 @@ fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> Log
     let bend =
         local_maximum(&gaussian(&log.normal_n, WIDTH, 2).iter().map(|d| d.abs()).collect::<Vec<_>>(), 4);
     let white = white_share(WIDTH) * log.torque_noise_nm.hypot(log.normal_noise_n / gain);
-    let noise = move |i: usize| {
-        vec![white, LEAST_NOISE * log.torque_nm[i], BETWEEN_SAMPLES * change[i], BEND * bend[i] / gain]
-    };
+    let noise = move |i: usize| vec![white, LEAST_NOISE * log.torque_nm[i]];
+    let guessed = move |i: usize| vec![BETWEEN_SAMPLES * change[i], BEND * bend[i] / gain];
     let touching = TOUCHING * scales.load_n;
     let left_out = log.filtered_n.iter().zip(&log.usable).map(|(n, used)| *n < touching || !used).collect();
-    LogRows { width: WIDTH, step_s: log.step_s, left_out, noise: Box::new(noise) }
+    LogRows { width: WIDTH, step_s: log.step_s, left_out, noise: Box::new(noise), guessed: Box::new(guessed) }
 }
 
 #[cfg(test)]

@@ -37,6 +37,8 @@ pub struct Rest {
     /// Change of the prediction by what is named here, RMS over that of the signal; 0 where nothing acts. In the contact
     /// that of the smallest cause.
     pub explained: f64,
+    /// The same of what is named in another balance, where nothing acts here.
+    pub elsewhere: f64,
     /// Mean square of the structured rest over that of the noise.
     pub times_noise: f64,
     /// Causes beyond the first in a set that is weighed as a whole, in a linear balance.
@@ -52,7 +54,7 @@ impl Rest {
     pub fn unknown(&self) -> f64 {
         let step = |ratio: f64| 1.0 / (1.0 + (-STEEPNESS * ratio.max(1e-9).ln()).exp());
         let alone = step(self.size / (BEYOND_FORM * MODEL_FORM))
-            * step(self.size / (MOST * self.explained).max(1e-12))
+            * step(self.size / (MOST * self.explained.max(self.elsewhere)).max(1e-12))
             * step(self.share / LEAST_SHARE)
             * step(self.times_noise);
         let odds = alone * (-LOG_PRIOR * self.further_causes as f64).exp();
@@ -281,6 +283,7 @@ pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscC
         size: rest.sqrt() / ground.signal,
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
+        elsewhere: 0.0,
         times_noise: rest / left.max(1e-300),
         further_causes: 0,
         follows: if rest > 0.0 {
@@ -389,6 +392,7 @@ pub fn of_balance(
         size: rest.sqrt() / balance.scale.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
         explained: explained / balance.scale.max(1e-12),
+        elsewhere: 0.0,
         times_noise: rest / left.max(1e-300),
         further_causes: causes.saturating_sub(1),
         follows: follows(residual, &balance.used, block, coordinates),
@@ -405,7 +409,13 @@ mod tests {
     /// A balance without a base whose response is everywhere the same, of efforts of this size.
     fn balance(response: f64, scale: f64) -> Balance {
         let left_out = vec![false; ROWS];
-        let rows = LogRows { width: 1.0, step_s: 1e-3, left_out, noise: Box::new(|_| vec![0.01]) };
+        let rows = LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out,
+            noise: Box::new(|_| vec![0.01]),
+            guessed: Box::new(|_| Vec::new()),
+        };
         Balance::new(vec![response; ROWS], Vec::new(), &[rows], scale)
     }
 
@@ -448,6 +458,14 @@ mod tests {
         assert_eq!([0.012, 0.020].map(|size_nm| told("bridge_drift", size_nm)), [false, true]);
         // What has another shape is known as well as a model is.
         assert_eq!([0.006, 0.012].map(|size_nm| told("m2_ripple", size_nm)), [false, true]);
+    }
+
+    #[test]
+    fn what_is_left_where_nothing_acts_is_weighed_against_what_is_explained_elsewhere() {
+        let rest =
+            |elsewhere| Rest { size: 0.03, share: 1.0, times_noise: 9.0, elsewhere, ..Rest::default() };
+        assert!(rest(0.0).unknown() > 0.99 && rest(0.02).unknown() > 0.99);
+        assert!(rest(0.15).unknown() < 0.01, "{}", rest(0.15).unknown());
     }
 
     #[test]

@@ -21,6 +21,8 @@ const SHORTEST: usize = 16;
 const LEAST_PART: usize = 8;
 /// Longest ones, as a part of the shortest log: means of more than it are few, and what is fitted has taken of them.
 const LONGEST: usize = 4;
+/// Variance of the process of a decade over the flat part.
+const OF_DECADE: f64 = std::f64::consts::LN_10 / (2.0 * std::f64::consts::LN_2);
 /// Time constants over the length of a block.
 const BLOCKS_LONG: [f64; 2] = [1.0, 10.0];
 
@@ -65,8 +67,20 @@ impl Errors<'_> {
         (median_magnitude(white.into_iter()), 0.5 * size * size, count)
     }
 
-    /// Variance of the first-order process of a decade.
-    fn of_decade(&self) -> f64 {
+    /// Variance of the first-order process of a decade, as far as it is seen: what is less than its own deviation is not, since
+    /// white noise in few long means looks like it in every other record.
+    pub(super) fn of_decade(&self) -> f64 {
+        let (level, variance) = self.level();
+        (level - variance.sqrt()).max(0.0) * OF_DECADE
+    }
+
+    /// The same at its likeliest: what is not seen for sure counts against what is as slow.
+    pub(super) fn likeliest_of_decade(&self) -> f64 {
+        self.level().0 * OF_DECADE
+    }
+
+    /// Flat part of the Allan variance, and the variance of that.
+    fn level(&self) -> (f64, f64) {
         let longest = self.lengths.iter().copied().min().unwrap_or(0) / LONGEST;
         let octaves = std::iter::successors(Some(SHORTEST), |m| Some(2 * m)).take_while(|m| *m <= longest);
         let (mut h, mut g) = (DMatrix::zeros(2, 2), DVector::zeros(2));
@@ -76,10 +90,7 @@ impl Errors<'_> {
             h += count as f64 * &row * row.transpose();
             g += count as f64 * row;
         }
-        // What is less than its own deviation is not seen: white noise in few long means looks like it in every other record.
-        let seen = linear::factor(&h).inverse()[(1, 1)] * VARIANCE_OF_VARIANCE;
-        let level = (linear::non_negative(&h, &g)[1] - seen.sqrt()).max(0.0);
-        level * std::f64::consts::LN_10 / (2.0 * std::f64::consts::LN_2)
+        (linear::non_negative(&h, &g)[1], linear::factor(&h).inverse()[(1, 1)] * VARIANCE_OF_VARIANCE)
     }
 
     /// Covariance of the score Σ g_t e_t that slow noise e makes, for the gradients g of each parameter; a block has so many

@@ -311,9 +311,7 @@ fn refined(
     trial: &(dyn Fn(&Coupling, &Solved) -> Option<Trial> + Sync),
 ) -> Option<(Trial, f64)> {
     let balance = view.balance;
-    let scaled = |solved: &Solved| -> Vec<f64> {
-        balance.used.iter().map(|&i| solved.residual[i] / balance.deviation[i]).collect()
-    };
+    let scaled = |solved: &Solved| balance.whitening.of(&solved.residual);
     let step = if start.numbers.gap_rad > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
     let mut log_occam = None;

@@ -15,14 +15,12 @@
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
 //! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::law::Contact;
 use super::log::ContactLog;
 use super::problem::{FREEDOM, Prediction};
 use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
-use crate::identify::linear;
+use crate::identify::variance_components::{self, Sample};
 
 /// What no model of friction is more accurate than, relative.
 pub(crate) const MODEL_FORM: f64 = 0.004;
@@ -41,6 +39,8 @@ const OF_FORCE: std::ops::Range<usize> = 3..7;
 /// Samples of a cycle of slip and stick below which its jumps run into each other: each is uncertain over the smoothing's width
 /// and the two samples beside it, and there are two in a cycle.
 const SAMPLES_PER_CYCLE: f64 = 10.0;
+/// The sensor's noise is known from the channel itself: its variance is at least this share of it.
+const LEAST_SENSOR: f64 = 0.2;
 /// Sources that are errors of the channel, from which the slip is observed too: the sensor's, motion between samples.
 const OF_CHANNEL: std::ops::Range<usize> = 0..3;
 /// Least certainty of a sample that takes part: the way's noise is up to three quarters of the variance.
@@ -262,38 +262,17 @@ impl Noise {
             filter.as_ref().map_or_else(|| vec![0.0; *count], |filter| filter.rung.clone())
         };
         let rung: Vec<f64> = self.filters.iter().flat_map(rung).collect();
-        let mut factors = [1.0; SOURCES];
-        // A prior of 0.2 % of the samples at a factor of one.
-        let strength = 2e-3 * used.len() as f64;
-        let scale: [f64; SOURCES] = std::array::from_fn(|s| {
-            used.iter().map(|&i| self.sources[i][s]).sum::<f64>() / used.len().max(1) as f64
-        });
-        for _ in 0..6 {
-            let (mut h, mut g) = (DMatrix::<f64>::zeros(SOURCES, SOURCES), DVector::<f64>::zeros(SOURCES));
-            for (&i, &y) in used.iter().zip(&square) {
-                let n = &self.sources[i];
-                let v = n.iter().zip(&factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24) + rung[i];
-                // Beyond three deviations a residual is the tail's; the cut costs 15 % of a Gaussian's variance.
-                let y = y.min(9.0 * v) * 1.15 - rung[i];
-                for a in 0..SOURCES {
-                    g[a] += n[a] * y / (v * v);
-                    for b in 0..=a {
-                        h[(a, b)] += n[a] * n[b] / (v * v);
-                    }
-                }
-            }
-            h.fill_upper_triangle_with_lower_triangle();
-            let typical =
-                used.iter().map(|&i| self.deviation[i].powi(2)).sum::<f64>() / used.len().max(1) as f64;
-            for s in 0..SOURCES {
-                let weight = 1e-2 * strength * (scale[s] / typical).powi(2) + 1e-30;
-                h[(s, s)] += weight;
-                g[s] += weight;
-            }
-            let found = linear::non_negative(&h, &g);
-            factors = std::array::from_fn(|s| found[s].max(1e-3));
-            factors[0] = factors[0].max(0.2);
-        }
+        let typical = used.iter().map(|&i| self.deviation[i].powi(2)).sum::<f64>() / used.len().max(1) as f64;
+        let sample = |(i, square): (&usize, &f64)| Sample {
+            sources: &self.sources[*i],
+            square: *square,
+            besides: rung[*i],
+        };
+        let samples: Vec<Sample<'_>> = used.iter().zip(&square).map(sample).collect();
+        let mut least = [variance_components::LEAST; SOURCES];
+        least[0] = LEAST_SENSOR;
+        let found = variance_components::fitted(&samples, &least, typical);
+        let factors: [f64; SOURCES] = std::array::from_fn(|s| found[s]);
         self.factors = factors;
         let before = std::mem::take(&mut self.deviation);
         self.weigh(logs, &factors);

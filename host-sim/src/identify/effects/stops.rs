@@ -136,6 +136,7 @@ mod tests {
             step_s: 1e-3,
             left_out: vec![false; ROWS],
             noise: Box::new(|_| vec![0.005]),
+            guessed: Box::new(|_| Vec::new()),
         };
         let balance = Balance::new(y, vec![(Parameter::amplitude("gain", 10.0), x.clone())], &[log], 1.0);
         let stops = Stops {

@@ -8,9 +8,9 @@ use super::{DriveLog, DriveView};
 use crate::identify::drive::direction;
 use crate::identify::term::Parameter;
 
-/// Widths, in shares of the usual speed: from standstill to all of it, a factor of two apart.
-const SHARES: [f64; 8] = [0.0078, 0.0156, 0.0312, 0.0625, 0.125, 0.25, 0.5, 1.0];
-/// The widest where the logs turn one way alone: there a controller gives less torque the faster it turns, and what falls over
+/// Widths, in shares of the widest: from standstill to all of it, a factor of two apart.
+const SHARES: [f64; 9] = [0.0039, 0.0078, 0.0156, 0.0312, 0.0625, 0.125, 0.25, 0.5, 1.0];
+/// The widest is the fastest speed, and in shares of the usual one where the logs turn one way alone: there a controller gives less torque the faster it turns, and what falls over
 /// the usual speed is the controller's. No controller of one speed gives the same curve both ways.
 const WIDEST_ONE_WAY: f64 = 0.5;
 /// Share of the motion that goes the rarer way at least: less is the encoder's noise about a standstill.
@@ -35,8 +35,13 @@ impl Curve {
     /// By the usual speed, or as found on other logs.
     pub(super) fn new(view: &DriveView<'_>) -> Self {
         let usual = || {
-            let widest = if turns_both_ways(view) { 1.0 } else { WIDEST_ONE_WAY };
-            SHARES.iter().filter(|share| **share <= widest).map(|share| share * view.scales.speed).collect()
+            let usual = view.scales.speed;
+            if !turns_both_ways(view) {
+                return SHARES.iter().filter(|s| **s <= WIDEST_ONE_WAY).map(|s| s * usual).collect();
+            }
+            let speeds = view.logs.iter().flat_map(|log| &log.speed);
+            let fastest = speeds.fold(0.0, |most: f64, speed| most.max(speed.abs()));
+            SHARES.iter().map(|share| share * fastest).collect()
         };
         let found = |fixed: &[(String, f64)]| {
             let one =

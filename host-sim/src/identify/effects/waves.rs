@@ -66,10 +66,8 @@ pub fn joint(
     own_phase: bool,
 ) -> Vec<f64> {
     let used = &balance.used;
-    let scaled = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        used.iter().map(|&i| of(i) / balance.deviation[i]).collect()
-    };
-    let y = scaled(&|i| company.residual[i]);
+    let scaled = |values: &[f64]| balance.whitening.of(values);
+    let y = scaled(company.residual);
     let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
     // The rows over which a wave has one phase.
     let starts = if own_phase { balance.starts.as_slice() } else { &[0] };
@@ -77,7 +75,10 @@ pub fn joint(
     let row = |point: usize| used.partition_point(|i| *i < point);
     let stretches: Vec<Range<usize>> =
         starts.iter().zip(ends).map(|(from, end)| row(*from)..row(end)).collect();
-    let wave = |k: f64| [f64::cos as fn(f64) -> f64, f64::sin].map(|of| scaled(&|i| of(k * position[i])));
+    let wave = |k: f64| {
+        [f64::cos as fn(f64) -> f64, f64::sin]
+            .map(|of| scaled(&position.iter().map(|x| of(k * x)).collect::<Vec<f64>>()))
+    };
     // Columns may be nearly the same where the position dwells.
     let ridged = |mut h: DMatrix<f64>| {
         for i in 0..h.nrows() {
@@ -87,7 +88,7 @@ pub fn joint(
     };
     let known = balance.base.iter().map(|(_, column)| column);
     let known = known.chain(company.forms.iter().flat_map(|form| &form.columns));
-    let mut columns: Vec<Vec<f64>> = known.map(|column| scaled(&|i| column[i])).collect();
+    let mut columns: Vec<Vec<f64>> = known.map(|column| scaled(column)).collect();
     let mut found = Vec::new();
     for _ in 0..most {
         // What a wave explains beside these columns, by Schur's complement: those are factored once for all waves.
@@ -307,6 +308,7 @@ mod tests {
             step_s: 1e-3,
             left_out: vec![false; ROWS],
             noise: Box::new(|_| vec![0.3]),
+            guessed: Box::new(|_| Vec::new()),
         };
         let base = vec![(Parameter::amplitude("base", 10.0), of_base)];
         let balance = Balance::new(residual.clone(), base, &[log(), log()], 1.0);
