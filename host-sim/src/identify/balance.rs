@@ -486,6 +486,10 @@ impl Balance {
     /// Takes the noise from the residuals of a solved set: the level of what is slow, that of what is new in each row, and the
     /// effective sample size.
     pub fn refit_noise(&mut self, solved: &Solved) {
+        if !self.rests {
+            // What ripples all the time would be taken for noise.
+            return self.refit_level(solved, 0.0);
+        }
         let logs = self.rows_of_logs();
         let of_rows = |of: &[f64]| -> Vec<f64> { logs.iter().flatten().map(|i| of[*i]).collect() };
         let lengths: Vec<usize> = logs.iter().map(Vec::len).collect();

@@ -41,6 +41,10 @@ impl Curve {
             }
             let speeds = view.logs.iter().flat_map(|log| &log.speed);
             let fastest = speeds.fold(0.0, |most: f64, speed| most.max(speed.abs()));
+            // Alone, nothing but the motor's torque tells a curve over all speeds from a delay of it.
+            if !view.balance.rests {
+                return SHARES[1..].iter().map(|share| share * usual).collect();
+            }
             SHARES.iter().map(|share| share * fastest).collect()
         };
         let found = |fixed: &[(String, f64)]| {
