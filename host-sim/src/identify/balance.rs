@@ -520,7 +520,7 @@ impl Balance {
         }
     }
 
-    /// The same beside slow processes of this variance.
+    /// Takes the level of what is new in each row, and the effective sample size, beside slow processes of this variance.
     fn refit_level(&mut self, solved: &Solved, of_each: f64) {
         self.whiten(of_each);
         let new = self.whitening.of(&solved.residual);

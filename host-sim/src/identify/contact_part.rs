@@ -167,12 +167,9 @@ impl ContactPart {
     /// What a candidate tells another balance.
     pub fn told(&self, by: Part, place: usize) -> Vec<&'static str> {
         let teller =
-            |effect: &&'static str| self.tellers.iter().find(|t| t.heard_by == by && t.effect == *effect);
+            |effect: &&'static str| self.tellers.iter().any(|t| t.heard_by == by && t.effect == *effect);
         let terms = self.fit(place).terms.iter().map(|term| &self.terms[*term]);
-        let told = terms
-            .filter(|term| term.heard_by() == by)
-            .map(|term| term.effect)
-            .filter(|e| teller(e).is_some());
+        let told = terms.filter(|term| term.heard_by() == by).map(|term| term.effect).filter(teller);
         let mut told: Vec<&'static str> = told.collect();
         told.sort_unstable();
         told
@@ -259,7 +256,9 @@ fn tellers(problem: &Problem<'_>, ranked: &[Ranked]) -> Vec<Teller> {
             if known || !term.changes_channel(values) {
                 continue;
             }
-            let open = if best - log_evidence <= OUT_OF_QUESTION {
+            // The friction bridge's noise stands in the drive too: what the contact leaves open of it the drive would take for the
+            // same noise once more, and confirm it.
+            let open = if heard_by == Part::Pressure && best - log_evidence <= OUT_OF_QUESTION {
                 let open = open.get_or_insert_with(|| problem.open(fit));
                 let own = open.view((own.start, own.start), (own.len(), own.len()));
                 linear::factor(&own.into_owned()).unpack()

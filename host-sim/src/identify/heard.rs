@@ -34,7 +34,7 @@ pub struct Teller {
     pub place: usize,
     /// Its values there.
     pub values: Vec<f64>,
-    /// Lower triangle of their covariance; no columns where the set is out of the question.
+    /// Lower triangle of their covariance; no columns where the set is out of the question, or nothing is to be left open.
     pub open: DMatrix<f64>,
 }
 

@@ -166,16 +166,12 @@ fn wanted((place, solved): &(usize, &Solved)) -> bool {
     *place < CANDIDATES || solved.set.len() < 2
 }
 
-/// What the drive makes of what the contact says of the friction channel. The noise of that bridge stands in both balances: what
-/// the contact leaves open is not left open here, or the drive would find the same noise once more and confirm it.
+/// What the drive makes of what the contact says of the friction channel.
 pub fn heard_by_drive(heard: &[Heard], logs: &[DriveLog]) -> Vec<Alternative> {
     let filtered = |error_nm: &ChannelError| -> Vec<f64> {
         logs.iter().zip(error_nm).flat_map(|(log, error_nm)| log.filtered(error_nm)).collect()
     };
-    heard
-        .iter()
-        .map(|heard| Heard { open: Vec::new(), error: heard.error.clone(), ..*heard }.form(filtered))
-        .collect()
+    heard.iter().map(|heard| heard.form(filtered)).collect()
 }
 
 /// What the normal-load actuator makes of what the contact says of the normal channel.
@@ -302,8 +298,7 @@ mod tests {
         let (balance, logs) = drive(shown_nm, 1.0);
         let open = open_nm.iter().map(|open_nm| vec![open_nm.to_vec()]).collect();
         let heard = [Heard { effect: "channel", error: vec![error_nm.to_vec()], open }];
-        let filtered = |error_nm: &ChannelError| logs[0].filtered(&error_nm[0]);
-        let form = &heard[0].form(filtered);
+        let form = &heard_by_drive(&heard, &logs)[0];
         let [none, with] = [&[][..], &[form]].map(|forms| balance.solve_forms(forms));
         (with.log_evidence - none.log_evidence, with.p[1..].to_vec())
     }
