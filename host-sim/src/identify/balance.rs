@@ -22,7 +22,7 @@ use super::same_amplitude::{Seen, log_ratio};
 use super::slow_noise;
 use super::term::Parameter;
 use super::variance_components::{self, Sample};
-use super::whitening::Whitening;
+use super::whitening::{LogPoints, Whitening};
 
 /// The disc where it does not move as the motor does.
 #[derive(Debug, Clone)]
@@ -266,8 +266,10 @@ impl Balance {
     fn whiten(&mut self, of_each: f64) {
         let logs = self.rows_of_logs();
         let between = |rows: &Vec<usize>| rows.windows(2).map(|pair| pair[1] - pair[0]).min();
-        let step = logs.iter().filter_map(between).min().unwrap_or(1);
-        self.whitening = Whitening::new(&logs, step, &self.deviation, of_each);
+        let row = logs.iter().filter_map(between).min().unwrap_or(1);
+        let step_s = self.row_step_s / row as f64;
+        let logs: Vec<LogPoints> = logs.into_iter().map(|points| LogPoints { points, step_s }).collect();
+        self.whitening = Whitening::new(&logs, &self.deviation, |_| true, of_each);
     }
 
     /// With the base's parameters from this place on as errors of the sensors, and the deviation of its bridge's zero.

@@ -170,8 +170,7 @@ impl FittedLaws {
     fn new(problem: &Problem<'_>, fit: Fit) -> Self {
         let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
         let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
-        let residuals = fit_interval::Residuals::new(problem, &fit);
-        let covariance = fit_interval::covariance(&columns, &residuals, &prior_sd);
+        let covariance = fit_interval::covariance(problem, &fit, columns.clone(), &prior_sd);
         Self { fit, columns, covariance }
     }
 }

@@ -14,7 +14,7 @@ use super::contact::log::{ContactLog, OBSERVED_OVER};
 use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
 use super::filters::rms;
 use super::fit_bias::Resimulated;
-use super::fit_interval::{Residuals, covariance, known};
+use super::fit_interval::{covariance, known};
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_profile::{Form, Profiles, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
@@ -199,17 +199,16 @@ pub fn identify(
     problem.noise = problem.noise_at(&[], &best.p);
     let mut fit = converged(&problem, best.p.clone(), ROUNDS, progress);
     for _ in 0..2 {
-        problem.noise.refit(&logs, &fit.r);
+        problem.refit_noise(&fit);
         fit = converged(&problem, fit.p.clone(), ROUNDS, progress);
     }
     let singular_ratio = examined(&problem, &fit.p).map_err(refuse)?;
 
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
-    let columns = problem.jacobian(&[], &fit.p, &fit.r);
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
     let (mut likely, mut under_prior) = {
-        let residuals = Residuals::new(&problem, &fit);
-        (known(&columns, &residuals, &alone), covariance(&columns, &residuals, &prior_sd))
+        let columns = problem.jacobian(&[], &fit.p, &fit.r);
+        (known(&problem, &fit, columns.clone(), &alone), covariance(&problem, &fit, columns, &prior_sd))
     };
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);

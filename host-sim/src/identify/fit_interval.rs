@@ -3,8 +3,8 @@
 //! cov p = H⁻¹ S H⁻¹ (Huber 1967, White 1980) with H = Σ ψ′(r_t) j_t j_tᵀ, S = Σ_b s_b s_bᵀ and s_b = Σ_{t∈b} j_t ψ(r_t)
 //! summed over a block of neighbouring samples, as [`crate::fit::covariance`] does for least squares; ψ is the slope of
 //! Student's likelihood. The blocks see whatever noise of the inputs, error between samples or of the model's form is
-//! left in the residuals and is correlated over less than a block; S has that of noise that is slower besides
-//! ([`super::slow_noise`]). The prior takes part in H alone, so that a number
+//! left in the residuals and is correlated over less than a block; of noise that is slower, residuals and columns are
+//! free: they are what is new in each sample ([`super::whitening`]). The prior takes part in H alone, so that a number
 //! that the logs do not determine is as uncertain as the prior and no less.
 
 use nalgebra::{DMatrix, DVector};
@@ -12,7 +12,6 @@ use nalgebra::{DMatrix, DVector};
 use super::contact::log::ContactLog;
 use super::contact::problem::{FREEDOM, Fit, Problem};
 use super::linear;
-use super::slow_noise::Errors;
 use crate::fit::covariance::BLOCKS;
 
 /// Blocks of nearly equal length, none across two logs; `lengths` are those of the logs.
@@ -28,31 +27,6 @@ fn blocks(lengths: &[usize]) -> Vec<std::ops::Range<usize>> {
     blocks
 }
 
-/// Residuals of a contact's logs on end.
-pub(super) struct Residuals<'a> {
-    /// Over their deviations; 0 where a sample takes no part.
-    r: &'a [f64],
-    /// The deviations, N m.
-    deviation_nm: &'a [f64],
-    /// Whether the tip slides.
-    slides: Vec<bool>,
-    /// Samples of each log.
-    lengths: Vec<usize>,
-}
-
-impl<'a> Residuals<'a> {
-    /// Those of a fit.
-    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit) -> Self {
-        let observed = problem.predict(&fit.terms, &fit.p).observed;
-        Self {
-            r: &fit.r,
-            deviation_nm: &problem.noise.deviation,
-            slides: observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect(),
-            lengths: problem.logs.iter().map(ContactLog::len).collect(),
-        }
-    }
-}
-
 /// What a likelihood says of parameters about where they were fitted.
 pub(super) struct Known {
     /// Covariance.
@@ -63,13 +37,23 @@ pub(super) struct Known {
 }
 
 /// Covariance of parameters whose prior is `prior_sd`, from the columns −∂r/∂p.
-pub(super) fn covariance(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f64]) -> DMatrix<f64> {
-    known(columns, of, prior_sd).covariance
+pub(super) fn covariance(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    columns: Vec<Vec<f64>>,
+    prior_sd: &[f64],
+) -> DMatrix<f64> {
+    known(problem, fit, columns, prior_sd).covariance
 }
 
 /// The same, and where the likelihood's top is.
-pub(super) fn known(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f64]) -> Known {
-    let Residuals { r, deviation_nm, slides, lengths } = of;
+pub(super) fn known(problem: &Problem<'_>, fit: &Fit, columns: Vec<Vec<f64>>, prior_sd: &[f64]) -> Known {
+    let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
+    of_blocks(&problem.noise.whitened_columns(columns), &problem.noise.whitened(&fit.r), &lengths, prior_sd)
+}
+
+/// From what is new in each sample, all logs on end, and the same of columns.
+fn of_blocks(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> Known {
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let slope: Vec<f64> = r
@@ -83,15 +67,7 @@ pub(super) fn known(columns: &[Vec<f64>], of: &Residuals<'_>, prior_sd: &[f64]) 
         columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
     let (mut h, _) = linear::normal_equations(&scaled, &slope, r);
     let blocks = blocks(lengths);
-    let residual = r.iter().zip(*deviation_nm).zip(slides);
-    let residual: Vec<f64> = residual.map(|((r, sd), slides)| if *slides { r * sd } else { 0.0 }).collect();
-    let gradient = |c: &Vec<f64>| {
-        c.iter().zip(&slope).zip(*deviation_nm).map(|((c, slope), sd)| c * slope / sd).collect()
-    };
-    let gradients: Vec<Vec<f64>> = scaled.iter().map(gradient).collect();
-    let errors = Errors { residual: &residual, deviation: deviation_nm, lengths };
-    let mut spread = DMatrix::identity(n, n)
-        + errors.spread_of_slow_noise(&gradients, r.len() as f64 / blocks.len().max(1) as f64);
+    let mut spread = DMatrix::identity(n, n);
     let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
     for block in blocks {
         let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
@@ -167,11 +143,9 @@ mod tests {
         assert!(slow < 2.0 && counts > 20.0, "{slow} {counts}");
     }
 
-    /// Of residuals of deviation 1 in one log that slides throughout.
+    /// Of residuals of deviation 1 in one log.
     fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> Known {
-        let deviation_nm = vec![1.0; r.len()];
-        let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
-        known(columns, &Residuals { r, deviation_nm: &deviation_nm, slides, lengths }, prior_sd)
+        of_blocks(columns, r, &[r.len()], prior_sd)
     }
 
     #[test]

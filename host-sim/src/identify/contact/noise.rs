@@ -15,12 +15,18 @@
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
 //! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides.
 
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
 use super::law::Contact;
 use super::log::ContactLog;
 use super::problem::{FREEDOM, Prediction};
 use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
+use crate::identify::slow_noise::Errors;
 use crate::identify::variance_components::{self, Sample};
+use crate::identify::whitening::{LogPoints, SLOW, Whitening};
 
 /// What no model of friction is more accurate than, relative.
 pub(crate) const MODEL_FORM: f64 = 0.004;
@@ -79,6 +85,8 @@ pub struct Noise {
     swinging: Vec<bool>,
     /// Factors a of the sources, as fitted.
     factors: [f64; SOURCES],
+    /// What is new in each sample beside slow noise; no rows before anything is fitted.
+    whitening: Whitening,
 }
 
 impl Noise {
@@ -253,10 +261,35 @@ impl Noise {
         self.of_channel = self.sources.iter().map(|n| own(n) / all(n)).collect();
     }
 
-    /// Fits the sources' factors to residuals (over the present deviations) and takes the effective sample size from
-    /// their spectrum.
-    pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
+    /// What is new in each sample of a series over the deviations, such as residuals.
+    pub fn whitened<'r>(&self, r: &'r [f64]) -> Cow<'r, [f64]> {
+        if self.whitening.is_slow() { self.whitening.of_relative(r).into() } else { r.into() }
+    }
+
+    /// The same of columns.
+    pub fn whitened_columns(&self, columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        if !self.whitening.is_slow() {
+            return columns;
+        }
+        columns.into_par_iter().map(|column| self.whitening.of_relative(&column)).collect()
+    }
+
+    /// Variance of the slow processes together that a sample shows, where the residuals (over the present deviations) have them.
+    fn slow_variance(&self, logs: &[ContactLog], r: &[f64], slides: &[bool]) -> f64 {
+        let seen = r.iter().zip(&self.deviation).zip(slides);
+        // Where a tip sticks, its slip is observed from the force, slow noise and all.
+        let residual: Vec<f64> =
+            seen.map(|((r, deviation), slides)| if *slides { r * deviation } else { 0.0 }).collect();
+        let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
+        Errors { residual: &residual, deviation: &self.deviation, lengths: &lengths }.likeliest_of_decade()
+    }
+
+    /// Fits the sources' factors to residuals (over the present deviations), beside them the level of slow noise, which shows where
+    /// the tip slides, and takes the effective sample size from what is new in each sample.
+    pub fn refit(&mut self, logs: &[ContactLog], r: &[f64], slides: &[bool]) {
         let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
+        let of_each = self.slow_variance(logs, r, slides);
+        let slow = |i: usize| if slides[i] { SLOW as f64 * of_each } else { 0.0 };
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
         let rung = |(filter, count): &(Option<Filter>, usize)| {
             filter.as_ref().map_or_else(|| vec![0.0; *count], |filter| filter.rung.clone())
@@ -266,7 +299,7 @@ impl Noise {
         let sample = |(i, square): (&usize, &f64)| Sample {
             sources: &self.sources[*i],
             square: *square,
-            besides: rung[*i],
+            besides: rung[*i] + slow(*i),
         };
         let samples: Vec<Sample<'_>> = used.iter().zip(&square).map(sample).collect();
         let mut least = [variance_components::LEAST; SOURCES];
@@ -277,15 +310,20 @@ impl Noise {
         let before = std::mem::take(&mut self.deviation);
         self.weigh(logs, &factors);
         self.share_channel(&factors);
-        // Influence of each residual on a slow parameter.
-        let pull: Vec<f64> = r
-            .iter()
-            .zip(before.iter().zip(&self.deviation))
-            .map(|(r, (old, new))| {
-                let r = r * old / new;
-                r * (FREEDOM + 1.0) / (FREEDOM + r * r)
-            })
-            .collect();
+        let mut points = used.into_iter().peekable();
+        let mut from = 0;
+        let rows = |log: &ContactLog| {
+            from += log.len();
+            let own = std::iter::from_fn(|| points.next_if(|point| *point < from)).collect();
+            LogPoints { points: own, step_s: log.grid.step_s }
+        };
+        let rows: Vec<LogPoints> = logs.iter().map(rows).collect();
+        self.whitening = Whitening::new(&rows, &self.deviation, |i| slides[i], of_each);
+        let r: Vec<f64> =
+            r.iter().zip(before.iter().zip(&self.deviation)).map(|(r, (old, new))| r * old / new).collect();
+        // Influence of each residual on a slow parameter, slow noise and all: what is left when that is taken out is as white as the
+        // filter makes it, and says nothing of errors of form that have the same spectrum and repeat themselves with the motion.
+        let pull: Vec<f64> = r.iter().map(|r| r * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
         let mut from = 0;
         let mut shares = Vec::new();
         for log in logs {

@@ -389,8 +389,9 @@ impl<'a> Problem<'a> {
 
     /// −ln likelihood, but for constants.
     pub fn misfit(&self, r: &[f64]) -> f64 {
+        let new = self.noise.whitened(r);
         // The logarithm of a product in place of a sum of logarithms.
-        let each = r.chunks(8).map(|r| r.iter().map(|r| 1.0 + r * r / FREEDOM).product::<f64>().ln());
+        let each = new.chunks(8).map(|r| r.iter().map(|r| 1.0 + r * r / FREEDOM).product::<f64>().ln());
         0.5 * (FREEDOM + 1.0) * each.sum::<f64>() / self.noise.temper
     }
 
@@ -483,9 +484,22 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Weights of iterated least squares.
-    pub fn weights(&self, r: &[f64]) -> Vec<f64> {
-        r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / self.noise.temper).collect()
+    /// JᵀWJ and JᵀWr of iterated least squares on what is new in each sample; it counts as so much.
+    fn normal(
+        &self,
+        columns: Vec<Vec<f64>>,
+        r: &[f64],
+        counts: impl Iterator<Item = f64>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let new = self.noise.whitened(r);
+        let weight = |(r, counts): (&f64, f64)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r);
+        let weights: Vec<f64> = new.iter().zip(counts).map(weight).collect();
+        normal_equations(&self.noise.whitened_columns(columns), &weights, &new)
+    }
+
+    /// The same as a fit takes them: all samples count alike.
+    pub fn normal_equations(&self, columns: Vec<Vec<f64>>, r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        self.normal(columns, r, std::iter::repeat(1.0 / self.noise.temper))
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
@@ -502,8 +516,7 @@ impl<'a> Problem<'a> {
             let fresh = slopes.is_none();
             let near = slopes.take().unwrap_or_else(|| Cow::Owned(self.slopes(terms, &p, &r)));
             let j = self.jacobian_with(&near, terms, &p, &r);
-            let w = self.weights(&r);
-            let (mut h, mut g) = normal_equations(&j, &w, &r);
+            let (mut h, mut g) = self.normal_equations(j, &r);
             for (i, q) in parameters.iter().enumerate() {
                 let sd = q.width(TYPICAL_SCALE);
                 h[(i, i)] += 1.0 / (sd * sd);
@@ -589,10 +602,11 @@ impl<'a> Problem<'a> {
     /// ln ∫ likelihood^share · prior by Laplace's method, averaged over the scale of the amplitudes: the whole evidence, and
     /// that with [`CONTACT_SHARE`].
     pub fn log_evidence(&self, fit: &Fit) -> [f64; 2] {
-        let each = || fit.r.iter().zip(self.noise.counts());
         let (h, g) = self.curvature(fit);
         let parameters: Vec<&Parameter> = self.parameters(&fit.terms).collect();
-        let misfit: f64 = each().map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p()).sum();
+        let new = self.noise.whitened(&fit.r);
+        let each = new.iter().zip(self.noise.counts());
+        let misfit: f64 = each.map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p()).sum();
         let at = Expansion {
             p: &fit.p,
             parameters: &parameters,
@@ -611,11 +625,14 @@ impl<'a> Problem<'a> {
 
     /// Curvature of −ln likelihood at a fit, and the slope of ln likelihood.
     fn curvature(&self, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
-        let j = self.jacobian(&fit.terms, &fit.p, &fit.r);
-        let each = fit.r.iter().zip(self.noise.counts());
-        let weights: Vec<f64> =
-            each.map(|(r, counts)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
-        normal_equations(&j, &weights, &fit.r)
+        self.normal(self.jacobian(&fit.terms, &fit.p, &fit.r), &fit.r, self.noise.counts())
+    }
+
+    /// Takes the noise from what a fit leaves.
+    pub fn refit_noise(&mut self, fit: &Fit) {
+        let observed = self.predict(&fit.terms, &fit.p).observed;
+        let slides: Vec<bool> = observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect();
+        self.noise.refit(self.logs, &fit.r, &slides);
     }
 }
 

@@ -14,7 +14,7 @@ use super::noise::MODEL_FORM;
 use super::problem::{Fit, Problem, Slopes};
 use crate::identify::evidence::{SCALES, log_mean_exp};
 use crate::identify::fit_interval;
-use crate::identify::linear::{self, normal_equations};
+use crate::identify::linear;
 
 /// A hypothesis with its ln evidence.
 #[derive(Debug, Clone)]
@@ -143,7 +143,7 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
     let mut ranked = rank(problem, Vec::new(), all);
     for _ in 0..2 {
         let refitted_to = ranked[0].fit.terms.clone();
-        problem.noise.refit(problem.logs, &ranked[0].fit.r);
+        problem.refit_noise(&ranked[0].fit);
         // What repeats itself is told from what no cause explains by the set that explains most.
         if let Some(fullest) = ranked.iter().map(|r| &r.fit).min_by(|a, b| a.cost.total_cmp(&b.cost)) {
             let samples = repeated(problem, fullest);
@@ -179,8 +179,9 @@ pub fn beside(problem: &Problem<'_>, ranked: Vec<Ranked>, found: Vec<Fit>) -> Ve
 
 /// How many of the samples that swing count as one to what is fitted.
 fn repeated(problem: &Problem<'_>, fit: &Fit) -> f64 {
-    let mut r = problem.residuals(&fit.terms, &fit.p);
-    let columns = problem.jacobian(&fit.terms, &fit.p, &r);
+    let left = problem.residuals(&fit.terms, &fit.p);
+    let columns = problem.noise.whitened_columns(problem.jacobian(&fit.terms, &fit.p, &left));
+    let mut r = problem.noise.whitened(&left).into_owned();
     // Samples without a residual say nothing.
     r.iter_mut().zip(problem.noise.swinging()).for_each(|(r, swings)| *r *= f64::from(u8::from(*swings)));
     let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
@@ -332,7 +333,6 @@ fn table(
     afresh: bool,
 ) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
     let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
-    let w = problem.weights(&parent.r);
     let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
     let others: Vec<usize> = (0..problem.terms.len())
         .filter(|t| !problem.terms[*t].law && !denied.contains(t) && !has(problem.terms[*t].effect))
@@ -374,7 +374,7 @@ fn table(
         places.push(all.len()..all.len() + columns.len());
         all.extend(columns.iter().cloned());
     }
-    let (h, g) = normal_equations(&all, &w, &parent.r);
+    let (h, g) = problem.normal_equations(all, &parent.r);
     // `prior` of the added columns: deviation and lower bound.
     let gain = |columns: &[usize], prior: &dyn Fn(usize) -> (f64, f64)| -> f64 {
         let index: Vec<usize> = (0..base_count).chain(columns.iter().copied()).collect();
