@@ -415,8 +415,12 @@ mod tests {
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
     use crate::identify::filters::rms;
+    use crate::identify::noise::White;
+    use crate::identify::noise::tests::white;
+    use crate::predict::{ContactInputs, simulate_friction};
 
     const COUNT: usize = 4000;
+    const LONG: usize = 15_000;
     const STEP_S: f64 = 1e-3;
     const MODE: (f64, f64) = (60.0, 0.02);
 
@@ -430,6 +434,66 @@ mod tests {
         let ring = SecondOrder::new(MODE.0, MODE.1, STEP_S);
         let mut state = SecondOrderState::holding(torque(0));
         (0..COUNT).map(|i| ring.step(&mut state, torque(i))).collect()
+    }
+
+    /// What the best drift of a bridge gains in ln evidence on logs of 15 s whose friction channel has this noise beside white one.
+    fn gained_by_a_drift(noise_nm: &(dyn Fn(u64) -> Vec<f64> + Sync)) -> f64 {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let model = ModelFile::assumed(&[]).unwrap();
+        let log = |seed: u64| {
+            let series = |of: &dyn Fn(f64) -> f64| (0..LONG).map(|i| of(STEP_S * i as f64)).collect();
+            let mut log = Log::default();
+            log.set_signal(Signal::Time, series(&|t| t));
+            log.set_signal(Signal::M2Speed, series(&|t| 6.0 + 3.0 * (1.3 * t).sin()));
+            log.set_signal(Signal::NormalForce, series(&|t| 70.0 + 25.0 * (0.7 * t).sin()));
+            log.set_signal(Signal::FrictionTorque, vec![0.0; LONG]);
+            let inputs = ContactInputs::new(&log.contact().unwrap(), &rig);
+            let torque_nm = simulate_friction(&model, &rig, &inputs).unwrap();
+            let noise =
+                noise_nm(seed).into_iter().zip(white(LONG, seed)).map(|(slow, white)| slow + 0.02 * white);
+            log.set_signal(Signal::FrictionTorque, torque_nm.iter().zip(noise).map(|(t, e)| t + e).collect());
+            ContactLog::new(&log, &rig).unwrap()
+        };
+        let logs = [1, 2].map(log);
+        let baseline = baseline::baseline(&model, baseline::KNOWN_WITHIN).with_bridge_zeros(&rig);
+        let terms: Vec<ContactTerm> = contact_terms(&logs, &Scales::new(&logs), true, 2, true)
+            .into_iter()
+            .filter(|term| term.effect == "bridge_drift")
+            .collect();
+        let mut problem = Problem::new(&logs, &baseline, &terms);
+        let ranked = search::search(&mut problem, &[], &|_| ()).ranked;
+        let best = |drifts: bool| {
+            let of_kind = |r: &&Ranked| r.fit.terms.is_empty() != drifts;
+            ranked.iter().find(of_kind).map_or(f64::NEG_INFINITY, |r| r.log_evidence)
+        };
+        best(true) - best(false)
+    }
+
+    #[test]
+    fn what_wanders_as_noise_does_is_no_drift() {
+        // First-order processes a decade apart: 1/f noise.
+        let flicker = |seed: u64| {
+            let mut noise = White::new(1000 + seed);
+            let mut states =
+                [0.05, 0.5, 5.0, 50.0].map(|long_s: f64| (f64::exp(-STEP_S / long_s), noise.next()));
+            let next = |_| {
+                let step = |(kept, state): &mut (f64, f64)| {
+                    *state = *kept * *state + (1.0 - *kept * *kept).sqrt() * noise.next();
+                    0.01 * *state
+                };
+                states.iter_mut().map(step).sum()
+            };
+            (0..LONG).map(next).collect::<Vec<f64>>()
+        };
+        let gained: Vec<f64> = [0, 10, 20, 30, 40, 50]
+            .into_par_iter()
+            .map(|first| gained_by_a_drift(&|seed| flicker(first + seed)))
+            .collect();
+        println!("{gained:.1?}");
+        assert!(gained.iter().all(|gained| *gained < 0.0), "{gained:.1?}");
+        let drifts = |_| (0..LONG).map(|i| 0.1 * i as f64 / LONG as f64).collect::<Vec<f64>>();
+        let gained = gained_by_a_drift(&drifts);
+        assert!(gained > -10.0 * LOG_PRIOR, "{gained}");
     }
 
     #[test]
