@@ -268,7 +268,8 @@ impl Balance {
         let between = |rows: &Vec<usize>| rows.windows(2).map(|pair| pair[1] - pair[0]).min();
         let row = logs.iter().filter_map(between).min().unwrap_or(1);
         let step_s = self.row_step_s / row as f64;
-        let logs: Vec<LogPoints> = logs.into_iter().map(|points| LogPoints { points, step_s }).collect();
+        let logs: Vec<LogPoints> =
+            logs.into_iter().map(|points| LogPoints { points, step_s, line: None }).collect();
         self.whitening = Whitening::new(&logs, &self.deviation, |_| true, of_each);
     }
 

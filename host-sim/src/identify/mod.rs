@@ -25,6 +25,7 @@ pub mod judge;
 mod law_form;
 pub mod linear;
 pub mod linear_part;
+mod mains;
 pub mod noise;
 pub mod normal_load;
 pub mod page;

@@ -1,16 +1,25 @@
-//! What white noise and slow noise together leave new in each row: generalised least squares.
+//! What white noise, slow noise and a mains line leave new in each row: generalised least squares.
 //!
-//! A row's error is e + Σ s_j with e white and s_j first-order processes of one variance a decade apart, which make 1/f noise
-//! (`slow_noise.rs`). The Kalman filter of that (Kalman 1960) turns a series into its innovations, which are white: response and
-//! columns alike go through it, so that what changes as slowly as the noise counts as little as it tells. Gains and deviations
-//! of the innovations depend on the rows' deviations alone and are the same for all columns.
+//! A row's error is e + Σ s_j + h with e white, s_j first-order processes of one variance a decade apart, which make 1/f noise
+//! (`slow_noise.rs`), and h a swing at the mains' frequency whose phase wanders as that does. The Kalman filter of that (Kalman
+//! 1960) turns a series into its innovations, which are white: response and columns alike go through it, so that what changes as
+//! the noise does counts as little as it tells. Gains and deviations of the innovations depend on the rows' deviations alone and
+//! are the same for all columns.
 
 use nalgebra::{SMatrix, SVector};
+
+use super::mains::Line;
 
 /// Time constants of the processes, s: a decade apart, from what the effective sample size counts to a log's length.
 const LONG_S: [f64; SLOW] = [0.05, 0.5, 5.0, 50.0];
 /// Processes.
 pub(super) const SLOW: usize = 4;
+/// States: the processes, and the swing with what it is a quarter of a turn later.
+const STATES: usize = SLOW + 2;
+/// For so long a mains line keeps its phase, s: that of a grid whose frequency is within 20 mHz, one deviation.
+const PHASE_KEPT_S: f64 = 8.0;
+
+type State = SVector<f64, STATES>;
 
 /// A row's part of the filter.
 #[derive(Debug, Clone)]
@@ -19,8 +28,10 @@ struct Row {
     point: usize,
     /// What is kept of each process since the row before; nothing at the begin of a log.
     kept: SVector<f64, SLOW>,
-    /// What each process takes of the innovation.
-    gain: SVector<f64, SLOW>,
+    /// How the swing has turned since.
+    turned: [f64; 2],
+    /// What each state takes of the innovation.
+    gain: State,
     /// Whether the processes show in it.
     shows: f64,
     /// Of the white noise.
@@ -29,20 +40,38 @@ struct Row {
     deviation: f64,
 }
 
+impl Row {
+    /// The states a row on.
+    fn moves(&self, state: &mut State) {
+        for j in 0..SLOW {
+            state[j] *= self.kept[j];
+        }
+        let ([cos, sin], [x, y]) = (self.turned, [state[SLOW], state[SLOW + 1]]);
+        (state[SLOW], state[SLOW + 1]) = (cos * x + sin * y, cos * y - sin * x);
+    }
+
+    /// What the row shows of the states.
+    fn shown(&self, state: &State) -> f64 {
+        self.shows * state.fixed_rows::<SLOW>(0).sum() + state[SLOW]
+    }
+}
+
 /// Rows of a log.
 pub(super) struct LogPoints {
     /// Their points.
     pub(super) points: Vec<usize>,
     /// Distance of two points, s.
     pub(super) step_s: f64,
+    /// The line that its channel shows.
+    pub(super) line: Option<Line>,
 }
 
 /// The filter for the rows of a balance.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Whitening {
     rows: Vec<Row>,
-    /// Whether there is slow noise.
-    slow: bool,
+    /// Whether there is anything but white noise.
+    coloured: bool,
 }
 
 impl Whitening {
@@ -54,32 +83,53 @@ impl Whitening {
         shows: impl Fn(usize) -> bool,
         of_each: f64,
     ) -> Self {
-        let stationary = SMatrix::<f64, SLOW, SLOW>::from_diagonal_element(of_each);
         let mut rows = Vec::new();
         for log in logs {
-            let mut variance = stationary;
+            let line = log.line.unwrap_or(Line { hz: 0.0, variance: 0.0 });
+            let stationary = State::from_fn(|j, _| if j < SLOW { of_each } else { line.variance });
+            let mut variance = SMatrix::<f64, STATES, STATES>::from_diagonal(&stationary);
             let mut before: Option<usize> = None;
             for &point in &log.points {
                 let since_s = before.map(|before| (point - before) as f64 * log.step_s);
-                let kept = SVector::from_fn(|j, _| since_s.map_or(0.0, |since| (-since / LONG_S[j]).exp()));
-                let moves = SMatrix::from_diagonal(&kept);
-                variance = stationary + moves * (variance - stationary) * moves;
-                let white = deviation[point];
-                let shows = f64::from(u8::from(shows(point)));
-                let seen = shows * variance.row_sum().transpose();
-                let of_innovation = white.powi(2) + seen.sum();
-                let gain = seen / of_innovation;
-                variance -= gain * seen.transpose();
-                rows.push(Row { point, kept, gain, shows, white, deviation: of_innovation.sqrt() });
+                let kept_for = |long_s: f64| since_s.map_or(0.0, |since| (-since / long_s).exp());
+                let (sin, cos) = (std::f64::consts::TAU * line.hz * since_s.unwrap_or(0.0)).sin_cos();
+                let mut row = Row {
+                    point,
+                    kept: SVector::from_fn(|j, _| kept_for(LONG_S[j])),
+                    turned: [cos, sin].map(|x| x * kept_for(PHASE_KEPT_S)),
+                    gain: State::zeros(),
+                    shows: f64::from(u8::from(shows(point))),
+                    white: deviation[point],
+                    deviation: 0.0,
+                };
+                // F P Fᵀ, columns and then rows, and what is new in each state so that its variance stays.
+                for _ in 0..2 {
+                    for j in 0..STATES {
+                        let mut column: State = variance.column(j).into_owned();
+                        row.moves(&mut column);
+                        variance.set_column(j, &column);
+                    }
+                    variance = variance.transpose();
+                }
+                for j in 0..STATES {
+                    let kept = if j < SLOW { row.kept[j] } else { kept_for(PHASE_KEPT_S) };
+                    variance[(j, j)] += stationary[j] * (1.0 - kept * kept);
+                }
+                let seen = State::from_fn(|j, _| row.shown(&variance.column(j).into_owned()));
+                let of_innovation = row.white.powi(2) + row.shown(&seen);
+                row.gain = seen / of_innovation;
+                row.deviation = of_innovation.sqrt();
+                variance -= row.gain * seen.transpose();
+                rows.push(row);
                 before = Some(point);
             }
         }
-        Self { rows, slow: of_each > 0.0 }
+        Self { rows, coloured: of_each > 0.0 || logs.iter().any(|log| log.line.is_some()) }
     }
 
-    /// Whether there is slow noise.
-    pub(super) fn is_slow(&self) -> bool {
-        self.slow
+    /// Whether there is anything but white noise.
+    pub(super) fn is_coloured(&self) -> bool {
+        self.coloured
     }
 
     /// Points of the rows, each with the deviation of its innovation.
@@ -89,7 +139,7 @@ impl Whitening {
 
     /// The innovations of a series over all points, over their deviations.
     pub(super) fn of(&self, values: &[f64]) -> Vec<f64> {
-        if !self.slow {
+        if !self.coloured {
             return self.rows.iter().map(|row| values[row.point] / row.deviation).collect();
         }
         self.innovations(|row| values[row.point]).collect()
@@ -104,10 +154,10 @@ impl Whitening {
     }
 
     fn innovations(&self, value: impl Fn(&Row) -> f64) -> impl Iterator<Item = f64> {
-        let mut state = SVector::<f64, SLOW>::zeros();
+        let mut state = State::zeros();
         self.rows.iter().map(move |row| {
-            state.component_mul_assign(&row.kept);
-            let innovation = value(row) - row.shows * state.sum();
+            row.moves(&mut state);
+            let innovation = value(row) - row.shown(&state);
             state += row.gain * innovation;
             innovation / row.deviation
         })
@@ -152,7 +202,7 @@ mod tests {
     fn innovations_of_slow_and_white_noise_are_white_and_of_deviation_one() {
         let of_each = 0.3;
         let deviations: Vec<f64> = (0..COUNT).map(deviation).collect();
-        let rows = [LogPoints { points: (0..COUNT).collect(), step_s: STEP_S }];
+        let rows = [LogPoints { points: (0..COUNT).collect(), step_s: STEP_S, line: None }];
         let (mut squares, mut before, mut after) = (0.0, 0.0, 0.0);
         const LOGS: u64 = 20;
         for seed in 0..LOGS {
@@ -171,7 +221,7 @@ mod tests {
 
     #[test]
     fn without_slow_noise_rows_are_over_their_deviation_and_a_new_log_has_forgotten() {
-        let logs = [vec![0, 2, 4], vec![6, 8]].map(|points| LogPoints { points, step_s: STEP_S });
+        let logs = [vec![0, 2, 4], vec![6, 8]].map(|points| LogPoints { points, step_s: STEP_S, line: None });
         let values: Vec<f64> = (0..10).map(f64::from).collect();
         let plain = Whitening::new(&logs, &[2.0; 10], |_| true, 0.0).of(&values);
         assert_eq!(plain, [0.0, 1.0, 2.0, 3.0, 4.0]);
@@ -187,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_row_in_which_slow_noise_does_not_show_tells_nothing_of_it() {
-        let points = LogPoints { points: (0..300).collect(), step_s: STEP_S };
+        let points = LogPoints { points: (0..300).collect(), step_s: STEP_S, line: None };
         let logs = std::slice::from_ref(&points);
         let sticks = |i: usize| (100..200).contains(&i);
         let values: Vec<f64> = (0..300).map(|i| if sticks(i) { 0.5 } else { 3.0 }).collect();
@@ -200,5 +250,26 @@ mod tests {
             white[99],
             white[200]
         );
+    }
+
+    #[test]
+    fn a_mains_line_is_known_after_a_few_turns_and_a_swing_beside_it_is_not() {
+        let line = Some(Line { hz: 50.0, variance: 2.0 });
+        let points = LogPoints { points: (0..COUNT).collect(), step_s: STEP_S, line };
+        let whitening = Whitening::new(std::slice::from_ref(&points), &[0.5; COUNT], |_| true, 0.0);
+        // It is a tenth of a hertz off, five times as far as a grid is.
+        let swing = |hz: f64| -> Vec<f64> {
+            (0..COUNT).map(|i| 2.0 * (std::f64::consts::TAU * hz * STEP_S * i as f64).sin()).collect()
+        };
+        let left = |hz: f64| crate::identify::filters::rms(&whitening.of(&swing(hz))[200..]);
+        // Over the white noise's deviation it was 2.8.
+        assert!(
+            left(50.0) < 0.1 && left(50.1) < 0.5 && left(55.0) > 2.0,
+            "{} {} {}",
+            left(50.0),
+            left(50.1),
+            left(55.0)
+        );
+        assert!(whitening.rows().skip(500).all(|(_, deviation)| (0.5..0.53).contains(&deviation)));
     }
 }

@@ -8,6 +8,7 @@ use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::identify::filters::{gaussian, gradient, local_maximum, rms, shifted, smoothed_flat};
 use crate::identify::grid::Grid;
+use crate::identify::mains::{self, Line};
 use crate::identify::noise;
 use crate::input_error::InputError;
 use crate::predict::BridgeModel;
@@ -69,6 +70,8 @@ pub struct ContactLog {
     pub friction_late: f64,
     /// What the friction channel swings with faster than a model can follow, where samples are regular enough to show it.
     pub ringing: Option<Ringing>,
+    /// What the friction channel picks up from the mains.
+    pub mains: Option<Line>,
 }
 
 /// A channel is at its end within so many deviations of its noise.
@@ -115,6 +118,7 @@ impl ContactLog {
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
+            mains: mains::line(&friction_nm, step_s),
             speed_noise_m_s: radius_m * speed_noise,
             m1_torque_nm: optional(Signal::M1Torque),
             m1_angle_rad: optional(Signal::M1Angle),

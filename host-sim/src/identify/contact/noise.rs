@@ -85,7 +85,7 @@ pub struct Noise {
     swinging: Vec<bool>,
     /// Factors a of the sources, as fitted.
     factors: [f64; SOURCES],
-    /// What is new in each sample beside slow noise; no rows before anything is fitted.
+    /// What is new in each sample beside slow noise and the mains' line; no rows before anything is fitted.
     whitening: Whitening,
 }
 
@@ -263,12 +263,12 @@ impl Noise {
 
     /// What is new in each sample of a series over the deviations, such as residuals.
     pub fn whitened<'r>(&self, r: &'r [f64]) -> Cow<'r, [f64]> {
-        if self.whitening.is_slow() { self.whitening.of_relative(r).into() } else { r.into() }
+        if self.whitening.is_coloured() { self.whitening.of_relative(r).into() } else { r.into() }
     }
 
     /// The same of columns.
     pub fn whitened_columns(&self, columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        if !self.whitening.is_slow() {
+        if !self.whitening.is_coloured() {
             return columns;
         }
         columns.into_par_iter().map(|column| self.whitening.of_relative(&column)).collect()
@@ -278,8 +278,16 @@ impl Noise {
     fn slow_variance(&self, logs: &[ContactLog], r: &[f64], slides: &[bool]) -> f64 {
         let seen = r.iter().zip(&self.deviation).zip(slides);
         // Where a tip sticks, its slip is observed from the force, slow noise and all.
-        let residual: Vec<f64> =
+        let mut residual: Vec<f64> =
             seen.map(|((r, deviation), slides)| if *slides { r * deviation } else { 0.0 }).collect();
+        let mut from = 0;
+        for log in logs {
+            let own = from..from + log.len();
+            from = own.end;
+            if let Some(line) = &log.mains {
+                line.take_off(&mut residual[own], log.grid.step_s);
+            }
+        }
         let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
         Errors { residual: &residual, deviation: &self.deviation, lengths: &lengths }.likeliest_of_decade()
     }
@@ -289,7 +297,13 @@ impl Noise {
     pub fn refit(&mut self, logs: &[ContactLog], r: &[f64], slides: &[bool]) {
         let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
         let of_each = self.slow_variance(logs, r, slides);
-        let slow = |i: usize| if slides[i] { SLOW as f64 * of_each } else { 0.0 };
+        let mains = logs
+            .iter()
+            .flat_map(|log| std::iter::repeat_n(log.mains.map_or(0.0, |line| line.variance), log.len()));
+        let coloured: Vec<f64> = mains
+            .zip(slides)
+            .map(|(line, slides)| line + if *slides { SLOW as f64 * of_each } else { 0.0 })
+            .collect();
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
         let rung = |(filter, count): &(Option<Filter>, usize)| {
             filter.as_ref().map_or_else(|| vec![0.0; *count], |filter| filter.rung.clone())
@@ -299,7 +313,7 @@ impl Noise {
         let sample = |(i, square): (&usize, &f64)| Sample {
             sources: &self.sources[*i],
             square: *square,
-            besides: rung[*i] + slow(*i),
+            besides: rung[*i] + coloured[*i],
         };
         let samples: Vec<Sample<'_>> = used.iter().zip(&square).map(sample).collect();
         let mut least = [variance_components::LEAST; SOURCES];
@@ -315,7 +329,7 @@ impl Noise {
         let rows = |log: &ContactLog| {
             from += log.len();
             let own = std::iter::from_fn(|| points.next_if(|point| *point < from)).collect();
-            LogPoints { points: own, step_s: log.grid.step_s }
+            LogPoints { points: own, step_s: log.grid.step_s, line: log.mains }
         };
         let rows: Vec<LogPoints> = logs.iter().map(rows).collect();
         self.whitening = Whitening::new(&rows, &self.deviation, |i| slides[i], of_each);
