@@ -199,7 +199,8 @@ pub fn identify(
     problem.noise = problem.noise_at(&[], &best.p);
     let mut fit = converged(&problem, best.p.clone(), ROUNDS, progress);
     for _ in 0..2 {
-        problem.refit_noise(&fit);
+        // Slow noise is in the intervals: taken out of the residuals, they held the truth in 25 of 30 fits, and 29 of the same with it.
+        problem.noise.refit(&logs, &fit.r);
         fit = converged(&problem, fit.p.clone(), ROUNDS, progress);
     }
     let singular_ratio = examined(&problem, &fit.p).map_err(refuse)?;

@@ -3,15 +3,16 @@
 //! cov p = H⁻¹ S H⁻¹ (Huber 1967, White 1980) with H = Σ ψ′(r_t) j_t j_tᵀ, S = Σ_b s_b s_bᵀ and s_b = Σ_{t∈b} j_t ψ(r_t)
 //! summed over a block of neighbouring samples, as [`crate::fit::covariance`] does for least squares; ψ is the slope of
 //! Student's likelihood. The blocks see whatever noise of the inputs, error between samples or of the model's form is
-//! left in the residuals and is correlated over less than a block; of noise that is slower, residuals and columns are
-//! free: they are what is new in each sample ([`super::whitening`]). The prior takes part in H alone, so that a number
-//! that the logs do not determine is as uncertain as the prior and no less.
+//! left in the residuals and is correlated over less than a block; S has that of noise that is slower besides
+//! ([`super::slow_noise`]), as far as it was not taken out of residuals and columns. The prior takes part in H alone, so that a
+//! number that the logs do not determine is as uncertain as the prior and no less.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::contact::log::ContactLog;
 use super::contact::problem::{FREEDOM, Fit, Problem};
 use super::linear;
+use super::slow_noise::Errors;
 use crate::fit::covariance::BLOCKS;
 
 /// Blocks of nearly equal length, none across two logs; `lengths` are those of the logs.
@@ -49,11 +50,28 @@ pub(super) fn covariance(
 /// The same, and where the likelihood's top is.
 pub(super) fn known(problem: &Problem<'_>, fit: &Fit, columns: Vec<Vec<f64>>, prior_sd: &[f64]) -> Known {
     let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
-    of_blocks(&problem.noise.whitened_columns(columns), &problem.noise.whitened(&fit.r), &lengths, prior_sd)
+    let slides = problem.slides(fit);
+    let slow = Slow { deviation_nm: &problem.noise.deviation, slides: &slides };
+    let columns = problem.noise.whitened_columns(columns);
+    of_blocks(&columns, &problem.noise.whitened(&fit.r), &lengths, prior_sd, &slow)
 }
 
-/// From what is new in each sample, all logs on end, and the same of columns.
-fn of_blocks(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> Known {
+/// What slow noise makes of the score is read from the residuals, N m, and the gradients of their influence.
+struct Slow<'a> {
+    /// Deviation of each sample, N m.
+    deviation_nm: &'a [f64],
+    /// Where the tip slides: elsewhere slow noise does not show.
+    slides: &'a [bool],
+}
+
+/// From residuals over their deviations, all logs on end; 0 where a sample takes no part.
+fn of_blocks(
+    columns: &[Vec<f64>],
+    r: &[f64],
+    lengths: &[usize],
+    prior_sd: &[f64],
+    &Slow { deviation_nm, slides }: &Slow<'_>,
+) -> Known {
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let slope: Vec<f64> = r
@@ -67,7 +85,15 @@ fn of_blocks(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: &[f64
         columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
     let (mut h, _) = linear::normal_equations(&scaled, &slope, r);
     let blocks = blocks(lengths);
-    let mut spread = DMatrix::identity(n, n);
+    let residual = r.iter().zip(deviation_nm).zip(slides);
+    let residual: Vec<f64> = residual.map(|((r, sd), slides)| if *slides { r * sd } else { 0.0 }).collect();
+    let gradient = |c: &Vec<f64>| {
+        c.iter().zip(&slope).zip(deviation_nm).map(|((c, slope), sd)| c * slope / sd).collect()
+    };
+    let gradients: Vec<Vec<f64>> = scaled.iter().map(gradient).collect();
+    let errors = Errors { residual: &residual, deviation: deviation_nm, lengths };
+    let mut spread = DMatrix::identity(n, n)
+        + errors.spread_of_slow_noise(&gradients, r.len() as f64 / blocks.len().max(1) as f64);
     let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
     for block in blocks {
         let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
@@ -145,7 +171,8 @@ mod tests {
 
     /// Of residuals of deviation 1 in one log.
     fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> Known {
-        of_blocks(columns, r, &[r.len()], prior_sd)
+        let slow = Slow { deviation_nm: &vec![1.0; r.len()], slides: &vec![true; r.len()] };
+        of_blocks(columns, r, &[r.len()], prior_sd, &slow)
     }
 
     #[test]

@@ -293,17 +293,37 @@ impl Noise {
     }
 
     /// Fits the sources' factors to residuals (over the present deviations), beside them the level of slow noise, which shows where
-    /// the tip slides, and takes the effective sample size from what is new in each sample.
-    pub fn refit(&mut self, logs: &[ContactLog], r: &[f64], slides: &[bool]) {
-        let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
+    /// the tip slides, and takes the effective sample size from their spectrum.
+    pub fn refit_coloured(&mut self, logs: &[ContactLog], r: &[f64], slides: &[bool]) {
         let of_each = self.slow_variance(logs, r, slides);
         let mains = logs
             .iter()
             .flat_map(|log| std::iter::repeat_n(log.mains.map_or(0.0, |line| line.variance), log.len()));
-        let coloured: Vec<f64> = mains
-            .zip(slides)
-            .map(|(line, slides)| line + if *slides { SLOW as f64 * of_each } else { 0.0 })
-            .collect();
+        let shown = |(line, slides): (f64, &bool)| line + if *slides { SLOW as f64 * of_each } else { 0.0 };
+        let coloured: Vec<f64> = mains.zip(slides).map(shown).collect();
+        self.refit_beside(logs, r, &coloured);
+        let mut from = 0;
+        let rows = |log: &ContactLog| {
+            let own = from..from + log.len();
+            from = own.end;
+            LogPoints {
+                points: own.filter(|i| r[*i] != 0.0).collect(),
+                step_s: log.grid.step_s,
+                line: log.mains,
+            }
+        };
+        let rows: Vec<LogPoints> = logs.iter().map(rows).collect();
+        self.whitening = Whitening::new(&rows, &self.deviation, |i| slides[i], of_each);
+    }
+
+    /// The same with all noise as white: what is slow is in the residuals.
+    pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
+        self.refit_beside(logs, r, &vec![0.0; r.len()]);
+    }
+
+    /// The same beside noise of this variance.
+    fn refit_beside(&mut self, logs: &[ContactLog], r: &[f64], coloured: &[f64]) {
+        let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
         let rung = |(filter, count): &(Option<Filter>, usize)| {
             filter.as_ref().map_or_else(|| vec![0.0; *count], |filter| filter.rung.clone())
@@ -324,15 +344,6 @@ impl Noise {
         let before = std::mem::take(&mut self.deviation);
         self.weigh(logs, &factors);
         self.share_channel(&factors);
-        let mut points = used.into_iter().peekable();
-        let mut from = 0;
-        let rows = |log: &ContactLog| {
-            from += log.len();
-            let own = std::iter::from_fn(|| points.next_if(|point| *point < from)).collect();
-            LogPoints { points: own, step_s: log.grid.step_s, line: log.mains }
-        };
-        let rows: Vec<LogPoints> = logs.iter().map(rows).collect();
-        self.whitening = Whitening::new(&rows, &self.deviation, |i| slides[i], of_each);
         let r: Vec<f64> =
             r.iter().zip(before.iter().zip(&self.deviation)).map(|(r, (old, new))| r * old / new).collect();
         // Influence of each residual on a slow parameter, slow noise and all: what is left when that is taken out is as white as the

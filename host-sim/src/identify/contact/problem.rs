@@ -630,9 +630,14 @@ impl<'a> Problem<'a> {
 
     /// Takes the noise from what a fit leaves.
     pub fn refit_noise(&mut self, fit: &Fit) {
+        let slides = self.slides(fit);
+        self.noise.refit_coloured(self.logs, &fit.r, &slides);
+    }
+
+    /// Where the tip slides.
+    pub fn slides(&self, fit: &Fit) -> Vec<bool> {
         let observed = self.predict(&fit.terms, &fit.p).observed;
-        let slides: Vec<bool> = observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect();
-        self.noise.refit(self.logs, &fit.r, &slides);
+        observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect()
     }
 }
 
