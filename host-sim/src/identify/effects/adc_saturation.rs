@@ -30,6 +30,9 @@ const TOUCHING: f64 = 0.1;
 const LINE_WITHIN: f64 = 0.03;
 /// ln of an end's width over the channel's noise: a converter ends within its noise, an amplifier bends before it does.
 const KNEE_WITHIN: f64 = 1.5;
+/// Widest end, as a share of it: a soft limiter of order 5 (Rapp 1991) is 2 % off at four such widths below its end. One that is
+/// wider is no end, but M1's torque in place of a noisy bridge.
+const WIDEST: f64 = 0.03;
 
 /// The end at which samples of a log pile up: more of them in the last band of values than in the next one below, thrice over,
 /// or more at all where another log ends at the same value: two courses have no reason to. No log goes beyond it; one that rests
@@ -149,9 +152,10 @@ impl AdcSaturation {
             Parameter::logarithm("normal_knee", noise / scale, KNEE_WITHIN),
         ];
         let start = parameters.iter().map(|p| p.mean).collect();
-        let load: Vec<Vec<f64>> = view.logs.iter().map(|log| log.load_n.clone()).collect();
+        // As smooth as the torque: a load that is less noisy than the bridge's would explain that noise, end or no end.
+        let load: Vec<Vec<f64>> = view.logs.iter().map(|log| gaussian(&log.load_n, TORQUE_WIDTH, 0)).collect();
         let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
-            let knee = scale * p[3].exp();
+            let knee = scale * p[3].exp().min(WIDEST * p[0]);
             let near = p[0] * scale - END_NOISES * knee;
             let of = |(load, torque): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
                 let factor = |(n, t): (&f64, &f64)| {
@@ -165,7 +169,7 @@ impl AdcSaturation {
         });
         let export = move |p: &[f64]| {
             let names = ["normal_high_n", "load_n_per_m1_torque_nm", "load_without_m1_torque_n", "normal_knee_n"];
-            let values = [p[0], p[1], p[2], p[3].exp()].map(|x| x * scale);
+            let values = [p[0], p[1], p[2], p[3].exp().min(WIDEST * p[0])].map(|x| x * scale);
             names.map(String::from).into_iter().zip(values).collect()
         };
         Some(ContactTerm { form: "normal", ..term }.exported(move |p, _| export(p)))
