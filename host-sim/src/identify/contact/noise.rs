@@ -26,7 +26,7 @@ use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
 use crate::identify::slow_noise::Errors;
 use crate::identify::variance_components::{self, Sample};
-use crate::identify::whitening::{LogPoints, SLOW, Whitening};
+use crate::identify::whitening::{LogPoints, Whitening};
 
 /// What no model of friction is more accurate than, relative.
 pub(crate) const MODEL_FORM: f64 = 0.004;
@@ -292,16 +292,13 @@ impl Noise {
         Errors { residual: &residual, deviation: &self.deviation, lengths: &lengths }.likeliest_of_decade()
     }
 
-    /// Fits the sources' factors to residuals (over the present deviations), beside them the level of slow noise, which shows where
-    /// the tip slides, and takes the effective sample size from their spectrum.
+    /// Fits the sources' factors to residuals (over the present deviations) and takes the effective sample size from their
+    /// spectrum; and the level of slow noise, which shows where the tip slides, for what is new in each sample. The deviations have
+    /// that noise too, and are not made smaller by it: what looks like slow noise may be an error of form, and a sample is not to
+    /// tell more for that. So whitening takes from what is slow and adds to nothing.
     pub fn refit_coloured(&mut self, logs: &[ContactLog], r: &[f64], slides: &[bool]) {
         let of_each = self.slow_variance(logs, r, slides);
-        let mains = logs
-            .iter()
-            .flat_map(|log| std::iter::repeat_n(log.mains.map_or(0.0, |line| line.variance), log.len()));
-        let shown = |(line, slides): (f64, &bool)| line + if *slides { SLOW as f64 * of_each } else { 0.0 };
-        let coloured: Vec<f64> = mains.zip(slides).map(shown).collect();
-        self.refit_beside(logs, r, &coloured);
+        self.refit(logs, r);
         let mut from = 0;
         let rows = |log: &ContactLog| {
             let own = from..from + log.len();
@@ -318,11 +315,6 @@ impl Noise {
 
     /// The same with all noise as white: what is slow is in the residuals.
     pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
-        self.refit_beside(logs, r, &vec![0.0; r.len()]);
-    }
-
-    /// The same beside noise of this variance.
-    fn refit_beside(&mut self, logs: &[ContactLog], r: &[f64], coloured: &[f64]) {
         let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
         let rung = |(filter, count): &(Option<Filter>, usize)| {
@@ -333,7 +325,7 @@ impl Noise {
         let sample = |(i, square): (&usize, &f64)| Sample {
             sources: &self.sources[*i],
             square: *square,
-            besides: rung[*i] + coloured[*i],
+            besides: rung[*i],
         };
         let samples: Vec<Sample<'_>> = used.iter().zip(&square).map(sample).collect();
         let mut least = [variance_components::LEAST; SOURCES];
