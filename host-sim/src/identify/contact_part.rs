@@ -489,7 +489,6 @@ mod tests {
             .into_par_iter()
             .map(|first| gained_by_a_drift(&|seed| flicker(first + seed)))
             .collect();
-        println!("{gained:.1?}");
         assert!(gained.iter().all(|gained| *gained < 0.0), "{gained:.1?}");
         let drifts = |_| (0..LONG).map(|i| 0.1 * i as f64 / LONG as f64).collect::<Vec<f64>>();
         let gained = gained_by_a_drift(&drifts);

@@ -81,7 +81,7 @@ mod tests {
             for amplitude in [0.0, 0.03] {
                 let of = |(i, e): (usize, f64)| {
                     let t = STEP_S * i as f64;
-                    let steps = if (t / 1.7) as usize % 2 == 0 { 2.0 } else { -1.5 };
+                    let steps = if ((t / 1.7) as usize).is_multiple_of(2) { 2.0 } else { -1.5 };
                     steps + 0.02 * e + amplitude * (TAU * (grid_hz + off_hz) * t + 0.4).sin()
                 };
                 let values: Vec<f64> = white(COUNT, 5).into_iter().enumerate().map(of).collect();
