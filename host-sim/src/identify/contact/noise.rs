@@ -13,7 +13,8 @@
 //! | transitions | 3 % of the load near a change between slip and stick |
 //!
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
-//! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides.
+//! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides. Nor is the channel's 1/f noise
+//! and its mains' line: in a diagnosis residuals and columns go through the filter that makes them white (`whitening.rs`).
 
 use std::borrow::Cow;
 
