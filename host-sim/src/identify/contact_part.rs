@@ -436,8 +436,8 @@ mod tests {
         (0..COUNT).map(|i| ring.step(&mut state, torque(i))).collect()
     }
 
-    /// What the best drift of a bridge gains in ln evidence on logs of 15 s whose friction channel has this noise beside white one.
-    fn gained_by_a_drift(noise_nm: &(dyn Fn(u64) -> Vec<f64> + Sync)) -> f64 {
+    /// What an effect at its best gains in ln evidence on logs of 15 s whose friction channel has this noise beside white one.
+    fn gained_by(effect: &str, noise_nm: &(dyn Fn(u64) -> Vec<f64> + Sync)) -> f64 {
         let rig = RigFile::assumed_rig(&[]).unwrap();
         let model = ModelFile::assumed(&[]).unwrap();
         let log = |seed: u64| {
@@ -458,12 +458,12 @@ mod tests {
         let baseline = baseline::baseline(&model, baseline::KNOWN_WITHIN).with_bridge_zeros(&rig);
         let terms: Vec<ContactTerm> = contact_terms(&logs, &Scales::new(&logs), true, 2, true)
             .into_iter()
-            .filter(|term| term.effect == "bridge_drift")
+            .filter(|term| term.effect == effect)
             .collect();
         let mut problem = Problem::new(&logs, &baseline, &terms);
         let ranked = search::search(&mut problem, &[], &|_| ()).ranked;
-        let best = |drifts: bool| {
-            let of_kind = |r: &&Ranked| r.fit.terms.is_empty() != drifts;
+        let best = |with: bool| {
+            let of_kind = |r: &&Ranked| r.fit.terms.is_empty() != with;
             ranked.iter().find(of_kind).map_or(f64::NEG_INFINITY, |r| r.log_evidence)
         };
         best(true) - best(false)
@@ -487,12 +487,23 @@ mod tests {
         };
         let gained: Vec<f64> = [0, 10, 20, 30, 40, 50]
             .into_par_iter()
-            .map(|first| gained_by_a_drift(&|seed| flicker(first + seed)))
+            .map(|first| gained_by("bridge_drift", &|seed| flicker(first + seed)))
             .collect();
         assert!(gained.iter().all(|gained| *gained < 0.0), "{gained:.1?}");
         let drifts = |_| (0..LONG).map(|i| 0.1 * i as f64 / LONG as f64).collect::<Vec<f64>>();
-        let gained = gained_by_a_drift(&drifts);
+        let gained = gained_by("bridge_drift", &drifts);
         assert!(gained > -10.0 * LOG_PRIOR, "{gained}");
+    }
+
+    #[test]
+    fn a_bridge_that_hums_has_no_other_mode() {
+        // An amplitude of twice the white noise's deviation.
+        let hum = |seed: u64| {
+            let turn = |i: usize| std::f64::consts::TAU * 50.0 * STEP_S * i as f64 + seed as f64;
+            (0..LONG).map(|i| 0.04 * turn(i).sin()).collect::<Vec<f64>>()
+        };
+        let gained = gained_by("ring_resonance", &hum);
+        assert!(gained < -LOG_PRIOR, "{gained}");
     }
 
     #[test]

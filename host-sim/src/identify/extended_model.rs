@@ -13,10 +13,11 @@ use super::contact::problem::{Fit, Numbers, Problem};
 use super::contact::search;
 use super::contact_part::ContactPart;
 use super::fit_contact::{self, Begin};
+use super::fit_interval::Linearised;
 use super::judge::Judgement;
 use super::linear_part::Linear;
 use super::table::Part;
-use super::{effects, fit_interval, fit_parameters};
+use super::{effects, fit_parameters};
 use crate::files::log::Log;
 use crate::files::model_file::{Extension, ModelFile, ModelKind};
 use crate::files::number;
@@ -170,7 +171,7 @@ impl FittedLaws {
     fn new(problem: &Problem<'_>, fit: Fit) -> Self {
         let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
         let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
-        let covariance = fit_interval::covariance(problem, &fit, columns.clone(), &prior_sd);
+        let covariance = Linearised::new(problem, &fit, columns.clone()).known(&prior_sd).covariance;
         Self { fit, columns, covariance }
     }
 }

@@ -14,7 +14,7 @@ use super::contact::log::{ContactLog, OBSERVED_OVER};
 use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
 use super::filters::rms;
 use super::fit_bias::Resimulated;
-use super::fit_interval::{covariance, known};
+use super::fit_interval::Linearised;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_profile::{Form, Profiles, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
@@ -208,8 +208,8 @@ pub fn identify(
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
     let (mut likely, mut under_prior) = {
-        let columns = problem.jacobian(&[], &fit.p, &fit.r);
-        (known(&problem, &fit, columns.clone(), &alone), covariance(&problem, &fit, columns, &prior_sd))
+        let linearised = Linearised::new(&problem, &fit, problem.jacobian(&[], &fit.p, &fit.r));
+        (linearised.known(&alone), linearised.known(&prior_sd).covariance)
     };
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);

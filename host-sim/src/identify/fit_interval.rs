@@ -7,6 +7,8 @@
 //! ([`super::slow_noise`]), as far as it was not taken out of residuals and columns. The prior takes part in H alone, so that a
 //! number that the logs do not determine is as uncertain as the prior and no less.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::contact::log::ContactLog;
@@ -37,77 +39,73 @@ pub(super) struct Known {
     pub(super) to_top: DVector<f64>,
 }
 
-/// Covariance of parameters whose prior is `prior_sd`, from the columns −∂r/∂p.
-pub(super) fn covariance(
-    problem: &Problem<'_>,
-    fit: &Fit,
+/// Residuals and columns −∂r/∂p of a fit, all logs on end, whitened as far as the noise is.
+pub(super) struct Linearised<'a> {
     columns: Vec<Vec<f64>>,
-    prior_sd: &[f64],
-) -> DMatrix<f64> {
-    known(problem, fit, columns, prior_sd).covariance
-}
-
-/// The same, and where the likelihood's top is.
-pub(super) fn known(problem: &Problem<'_>, fit: &Fit, columns: Vec<Vec<f64>>, prior_sd: &[f64]) -> Known {
-    let lengths: Vec<usize> = problem.logs.iter().map(ContactLog::len).collect();
-    let slides = problem.slides(fit);
-    let slow = Slow { deviation_nm: &problem.noise.deviation, slides: &slides };
-    let columns = problem.noise.whitened_columns(columns);
-    of_blocks(&columns, &problem.noise.whitened(&fit.r), &lengths, prior_sd, &slow)
-}
-
-/// What slow noise makes of the score is read from the residuals, N m, and the gradients of their influence.
-struct Slow<'a> {
-    /// Deviation of each sample, N m.
+    /// Residuals over their deviations; 0 where a sample takes no part.
+    r: Cow<'a, [f64]>,
+    /// The deviations, N m.
     deviation_nm: &'a [f64],
     /// Where the tip slides: elsewhere slow noise does not show.
-    slides: &'a [bool],
+    slides: Vec<bool>,
+    /// Samples of each log.
+    lengths: Vec<usize>,
 }
 
-/// From residuals over their deviations, all logs on end; 0 where a sample takes no part.
-fn of_blocks(
-    columns: &[Vec<f64>],
-    r: &[f64],
-    lengths: &[usize],
-    prior_sd: &[f64],
-    &Slow { deviation_nm, slides }: &Slow<'_>,
-) -> Known {
-    let n = columns.len();
-    let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
-    let slope: Vec<f64> = r
-        .iter()
-        .map(
-            |r| if *r == 0.0 { 0.0 } else { (FREEDOM + 1.0) * (FREEDOM - r * r) / (FREEDOM + r * r).powi(2) },
-        )
-        .collect();
-    // In units of the prior, so that the inverse is of numbers of one size.
-    let scaled: Vec<Vec<f64>> =
-        columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
-    let (mut h, _) = linear::normal_equations(&scaled, &slope, r);
-    let blocks = blocks(lengths);
-    let residual = r.iter().zip(deviation_nm).zip(slides);
-    let residual: Vec<f64> = residual.map(|((r, sd), slides)| if *slides { r * sd } else { 0.0 }).collect();
-    let gradient = |c: &Vec<f64>| {
-        c.iter().zip(&slope).zip(deviation_nm).map(|((c, slope), sd)| c * slope / sd).collect()
-    };
-    let gradients: Vec<Vec<f64>> = scaled.iter().map(gradient).collect();
-    let errors = Errors { residual: &residual, deviation: deviation_nm, lengths };
-    let mut spread = DMatrix::identity(n, n)
-        + errors.spread_of_slow_noise(&gradients, r.len() as f64 / blocks.len().max(1) as f64);
-    let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
-    for block in blocks {
-        let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
-        spread += freedom * &sum * sum.transpose();
+impl<'a> Linearised<'a> {
+    /// About a fit.
+    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit, columns: Vec<Vec<f64>>) -> Self {
+        Self {
+            columns: problem.noise.whitened_columns(columns),
+            r: problem.noise.whitened(&fit.r),
+            deviation_nm: &problem.noise.deviation,
+            slides: problem.slides(fit),
+            lengths: problem.logs.iter().map(ContactLog::len).collect(),
+        }
     }
-    for i in 0..n {
-        h[(i, i)] += 1.0;
-    }
-    let factor = linear::factor(&h);
-    let covariance = factor.solve(&factor.solve(&spread).transpose());
-    let to_top = factor.solve(&DVector::from_fn(n, |i, _| linear::dot(&scaled[i], &score)));
-    Known {
-        covariance: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * prior_sd[i] * prior_sd[j]),
-        to_top: to_top.component_mul(&DVector::from_column_slice(prior_sd)),
+
+    /// What it says of parameters whose prior is `prior_sd`.
+    pub(super) fn known(&self, prior_sd: &[f64]) -> Known {
+        let Self { columns, r, deviation_nm, slides, lengths } = self;
+        let n = columns.len();
+        let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
+        let slope: Vec<f64> = r
+            .iter()
+            .map(|r| {
+                if *r == 0.0 { 0.0 } else { (FREEDOM + 1.0) * (FREEDOM - r * r) / (FREEDOM + r * r).powi(2) }
+            })
+            .collect();
+        // In units of the prior, so that the inverse is of numbers of one size.
+        let scaled: Vec<Vec<f64>> =
+            columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
+        let (mut h, _) = linear::normal_equations(&scaled, &slope, r);
+        let blocks = blocks(lengths);
+        let residual = r.iter().zip(*deviation_nm).zip(slides);
+        let residual: Vec<f64> =
+            residual.map(|((r, sd), slides)| if *slides { r * sd } else { 0.0 }).collect();
+        let gradient = |c: &Vec<f64>| {
+            c.iter().zip(&slope).zip(*deviation_nm).map(|((c, slope), sd)| c * slope / sd).collect()
+        };
+        let gradients: Vec<Vec<f64>> = scaled.iter().map(gradient).collect();
+        let errors = Errors { residual: &residual, deviation: deviation_nm, lengths };
+        let mut spread = DMatrix::identity(n, n)
+            + errors.spread_of_slow_noise(&gradients, r.len() as f64 / blocks.len().max(1) as f64);
+        let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
+        for block in blocks {
+            let sum =
+                DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
+            spread += freedom * &sum * sum.transpose();
+        }
+        for i in 0..n {
+            h[(i, i)] += 1.0;
+        }
+        let factor = linear::factor(&h);
+        let covariance = factor.solve(&factor.solve(&spread).transpose());
+        let to_top = factor.solve(&DVector::from_fn(n, |i, _| linear::dot(&scaled[i], &score)));
+        Known {
+            covariance: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * prior_sd[i] * prior_sd[j]),
+            to_top: to_top.component_mul(&DVector::from_column_slice(prior_sd)),
+        }
     }
 }
 
@@ -169,10 +167,11 @@ mod tests {
         assert!(slow < 2.0 && counts > 20.0, "{slow} {counts}");
     }
 
-    /// Of residuals of deviation 1 in one log.
+    /// Of residuals of deviation 1 in one log that slides throughout.
     fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> Known {
-        let slow = Slow { deviation_nm: &vec![1.0; r.len()], slides: &vec![true; r.len()] };
-        of_blocks(columns, r, &[r.len()], prior_sd, &slow)
+        let deviation_nm = &vec![1.0; r.len()];
+        let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
+        Linearised { columns: columns.to_vec(), r: r.into(), deviation_nm, slides, lengths }.known(prior_sd)
     }
 
     #[test]

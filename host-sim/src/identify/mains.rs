@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use rustfft::num_complex::Complex;
+
 /// Frequencies of the grids there are, Hz.
 const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 /// It is looked for so many places of the spectrum on either side: a Hann window's line is as wide, and a grid within 20 mHz.
@@ -36,7 +38,7 @@ impl Line {
     }
 }
 
-/// The stronger line of the two grids in an even series; `None` where neither stands out.
+/// The stronger line of the two grids in an even series, behind a Hann window; `None` where neither stands out.
 pub(super) fn line(values: &[f64], step_s: f64) -> Option<Line> {
     let of_grid = |hz: f64| (hz * step_s < 0.5).then(|| at(values, step_s, hz)).flatten();
     GRIDS_HZ.into_iter().filter_map(of_grid).max_by(|a, b| a.variance.total_cmp(&b.variance))
@@ -44,8 +46,13 @@ pub(super) fn line(values: &[f64], step_s: f64) -> Option<Line> {
 
 fn at(values: &[f64], step_s: f64, hz: f64) -> Option<Line> {
     let length_s = values.len() as f64 * step_s;
-    let power: Vec<f64> =
-        (-BESIDE..=BESIDE).map(|place| power(values, step_s, hz + f64::from(place) / length_s)).collect();
+    let sums: Vec<Complex<f64>> = (-BESIDE - 1..=BESIDE + 1)
+        .map(|place| turned_sum(values, TAU * step_s * (hz + f64::from(place) / length_s)))
+        .collect();
+    // 1 − cos takes half of either neighbour off; its own sum is that of the places.
+    let behind_window = |x: &[Complex<f64>]| x[1] - 0.5 * (x[0] + x[2]);
+    let of_amplitude = 2.0 / (values.len().max(1) as f64).powi(2);
+    let power: Vec<f64> = sums.windows(3).map(|x| of_amplitude * behind_window(x).norm_sqr()).collect();
     let near = |at: &usize| at.abs_diff(BESIDE as usize) <= WIDE as usize;
     let strongest = (0..power.len()).filter(near).map(|at| power[at]).fold(0.0, f64::max);
     let mut beside: Vec<f64> = (0..power.len()).filter(|at| !near(at)).map(|at| power[at]).collect();
@@ -55,16 +62,15 @@ fn at(values: &[f64], step_s: f64, hz: f64) -> Option<Line> {
     (strongest > OVER_NOISE * level).then_some(Line { hz, variance: strongest - level })
 }
 
-/// Variance of the swing at a frequency behind a Hann window.
-fn power(values: &[f64], step_s: f64, hz: f64) -> f64 {
-    let (turn, window) = (TAU * hz * step_s, TAU / values.len().max(1) as f64);
-    let (mut re, mut im, mut weights) = (0.0, 0.0, 0.0);
-    for (i, x) in values.iter().enumerate() {
-        let weight = 1.0 - (window * i as f64).cos();
-        let (sin, cos) = (turn * i as f64).sin_cos();
-        (re, im, weights) = (re + weight * x * cos, im + weight * x * sin, weights + weight);
-    }
-    2.0 * (re * re + im * im) / (weights * weights).max(f64::MIN_POSITIVE)
+/// Sum of a series that is turned back by so many radians a sample.
+fn turned_sum(values: &[f64], turn: f64) -> Complex<f64> {
+    let step = Complex::from_polar(1.0, -turn);
+    let turned = values.iter().scan(Complex::ONE, |turned, x| {
+        let now = *turned;
+        *turned *= step;
+        Some(now * x)
+    });
+    turned.sum()
 }
 
 #[cfg(test)]
