@@ -183,10 +183,15 @@ fn known(name: &str, mean: f64, sd: f64) -> Parameter {
 
 #[cfg(test)]
 mod tests {
+    use super::super::coordinates::{Coordinates, Scales};
     use super::*;
+    use crate::files::log::Log;
     use crate::files::model_file::ModelFile;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
     use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
     use crate::identify::contact::change::Change;
+    use crate::identify::contact::log::ContactLog;
     use crate::identify::noise::tests::white;
 
     const NOISE: f64 = 0.01;
@@ -217,6 +222,46 @@ mod tests {
         assert_eq!(export(&[1.4], &mut numbers), [(NAMES[1].to_string(), 2.8)]);
         let law = Law::new(&[AdcSaturation.absent(NAMES[0]), 2.8]).expect("allowed");
         assert_eq!([law.shown_nm(-1e6), law.shown_nm(1e6)], [-1e6, 2.8]);
+    }
+
+    #[test]
+    fn an_end_of_the_normal_channel_is_local_however_wide_it_is_asked_for() {
+        const END_N: f64 = 90.0;
+        let log = |phase: f64| {
+            let load_n = |i: usize| 70.0 + 40.0 * (0.003 * i as f64 + phase).sin();
+            let series = |of: &dyn Fn(usize) -> f64| (0..20_000).map(of).collect::<Vec<f64>>();
+            let mut log = Log::default();
+            log.set_signal(Signal::Time, series(&|i| 1e-3 * i as f64));
+            log.set_signal(Signal::M2Speed, vec![5.0; 20_000]);
+            log.set_signal(Signal::M1Torque, series(&|i| load_n(i) / 25.0));
+            log.set_signal(Signal::FrictionTorque, series(&|i| 0.04 * load_n(i)));
+            let noise = white(20_000, phase as u64);
+            log.set_signal(Signal::NormalForce, series(&|i| (load_n(i) + 0.3 * noise[i]).min(END_N)));
+            ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()
+        };
+        let logs = [log(0.0), log(1.0)];
+        let scales = Scales::new(&logs);
+        let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, &scales)).collect();
+        let view = ContactView {
+            logs: &logs,
+            coordinates: &coordinates,
+            scales: &scales,
+            training: true,
+            train_count: logs.len(),
+            block: true,
+        };
+        let term = AdcSaturation.normal(&view).expect("an end");
+        let Starts::At(starts) = &term.starts else { panic!("one start") };
+        let mut wide = starts[0].clone();
+        wide[3] = 0f64;
+        let mut change = Change::default();
+        (term.act)(&wide, &mut change);
+        let (end_n, knee_n) = change.normal_end_n.expect("an end");
+        assert!((end_n - END_N).abs() < 1.0 && (knee_n - WIDEST * end_n).abs() < 1e-9, "{end_n} {knee_n}");
+        // Half of the range below it is as the bridge shows it.
+        let factor = &change.log_factor.expect("a factor")[0];
+        let low = logs[0].load_n.iter().zip(factor).filter(|(load, _)| **load < 0.5 * END_N);
+        assert!(low.map(|(_, factor)| factor.abs()).fold(0.0, f64::max) < 1e-6);
     }
 
     #[test]
