@@ -397,9 +397,10 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         base.push((wide("friction_zero", 0.0, deviation), concat(&|log| vec![-1.0; log.len()])));
     }
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, contact, scales)).collect();
+    let balance = Balance::new(concat(&response), base, &rows, scales.effort)
+        .with_sensors(SENSORS, prior.bridge_zero.unwrap_or(0.0));
     // A drive alone is looked at for its ripple.
-    Balance { rests: contact, ..Balance::new(concat(&response), base, &rows, scales.effort) }
-        .with_sensors(SENSORS, prior.bridge_zero.unwrap_or(0.0))
+    if contact { balance } else { balance.without_rests() }
 }
 
 /// Rows of a log: noise from named sources; near standstill the bearing's friction is a reaction.

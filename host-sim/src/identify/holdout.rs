@@ -184,7 +184,9 @@ fn contact_errors(
     problem.noise = problem.noise_at(&own_terms, &fit.p);
     let left = |problem: &Problem<'_>, terms: &[usize], p: &[f64]| {
         let shown = problem.predict(terms, p).shown_nm;
-        problem.noise.innovations(problem.measured().zip(shown).map(|(y, x)| y - x).collect())
+        let mut left: Vec<f64> = problem.measured().zip(shown).map(|(y, x)| y - x).collect();
+        problem.noise.innovations(&mut left);
+        left
     };
     let logged = Problem::with_noise(as_logged, &contact.baseline, &terms, problem.noise.clone());
     let (base, extended) = (left(&logged, &none.terms, &none.p), left(&problem, &own_terms, &fit.p));

@@ -105,13 +105,22 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     low.to_array().iter().chain(&high.to_array()).sum::<f64>() + rest
 }
 
+/// Σ ln(1 + x²/scale), as logarithms of products in place of a sum of logarithms.
+pub fn sum_of_logs(values: &[f64], scale: f64) -> f64 {
+    values.chunks(8).map(|x| x.iter().map(|x| 1.0 + x * x / scale).product::<f64>().ln()).sum()
+}
+
 /// Rows that are taken together: some 20 columns of them, and the same with weights, fit in a core's own cache.
 const ROWS_AT_ONCE: usize = 128;
 /// Rows of a task of its own.
 const ROWS_OF_A_TASK: usize = 64 * ROWS_AT_ONCE;
 
 /// JᵀWJ and JᵀWr; the order of summation is fixed, however many threads there are.
-pub fn normal_equations(j: &[Vec<f64>], w: &[f64], r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+pub fn normal_equations<C: AsRef<[f64]> + Sync>(
+    j: &[C],
+    w: &[f64],
+    r: &[f64],
+) -> (DMatrix<f64>, DVector<f64>) {
     let n = j.len();
     let tasks: Vec<(DMatrix<f64>, DVector<f64>)> = (0..r.len().div_ceil(ROWS_OF_A_TASK))
         .into_par_iter()
@@ -123,10 +132,10 @@ pub fn normal_equations(j: &[Vec<f64>], w: &[f64], r: &[f64]) -> (DMatrix<f64>, 
                 let rows = from..(from + ROWS_AT_ONCE).min(end);
                 for a in 0..n {
                     let weighted = &mut weighted[..rows.len()];
-                    let pairs = j[a][rows.clone()].iter().zip(&w[rows.clone()]);
+                    let pairs = j[a].as_ref()[rows.clone()].iter().zip(&w[rows.clone()]);
                     weighted.iter_mut().zip(pairs).for_each(|(out, (x, w))| *out = x * w);
                     for b in 0..=a {
-                        h[(a, b)] += dot(weighted, &j[b][rows.clone()]);
+                        h[(a, b)] += dot(weighted, &j[b].as_ref()[rows.clone()]);
                     }
                     g[a] += dot(weighted, &r[rows.clone()]);
                 }

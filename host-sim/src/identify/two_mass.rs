@@ -311,7 +311,6 @@ fn refined(
     trial: &(dyn Fn(&Coupling, &Solved) -> Option<Trial> + Sync),
 ) -> Option<(Trial, f64)> {
     let balance = view.balance;
-    let scaled = |solved: &Solved| balance.whitening.of(&solved.residual);
     let step = if start.numbers.gap_rad > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
     let mut log_occam = None;
@@ -319,14 +318,14 @@ fn refined(
     let mut slopes: Option<Vec<Vec<f64>>> = None;
     for _ in 0..ITERATIONS {
         let p = best.numbers.fitted();
-        let r = scaled(&best.solved);
+        let r = &best.solved.innovations;
         let fresh = slopes.is_none();
         let slope = |i: usize| {
             let moved = |step: f64| {
                 let mut q = p.clone();
                 q[i] += step;
                 let there = trial(&best.numbers.with(&q), &best.solved)?;
-                Some(scaled(&there.solved).iter().zip(&r).map(|(a, b)| (b - a) / step).collect())
+                Some(there.solved.innovations.iter().zip(r).map(|(a, b)| (b - a) / step).collect())
             };
             // At the end of what is allowed the other way.
             moved(step).or_else(|| moved(-step))
@@ -335,7 +334,7 @@ fn refined(
         let Some(columns) = taken else { break };
         let weights: Vec<f64> =
             r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
-        let (h, g) = linear::normal_equations(&columns, &weights, &r);
+        let (h, g) = linear::normal_equations(&columns, &weights, r);
         log_occam = Some(best.numbers.log_occam(&h));
         let mut better = None;
         for _ in 0..if fresh { 4 } else { 1 } {

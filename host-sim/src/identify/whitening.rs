@@ -6,7 +6,11 @@
 //! the noise does counts as little as it tells. Gains and deviations of the innovations depend on the rows' deviations alone and
 //! are the same for all columns.
 
+use std::ops::{Add, Mul, Sub};
+
 use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
+use wide::f64x4;
 
 use super::mains::Line;
 
@@ -21,17 +25,25 @@ const PHASE_KEPT_S: f64 = 8.0;
 
 type State = SVector<f64, STATES>;
 
+/// Columns that go through the filter together.
+const LANES: usize = 4;
+
+/// A value of a column, or of some beside each other.
+trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self> {}
+impl Lane for f64 {}
+impl Lane for f64x4 {}
+
 /// A row's part of the filter.
 #[derive(Debug, Clone)]
 struct Row {
     /// Place among all points.
     point: usize,
     /// What is kept of each process since the row before; nothing at the begin of a log.
-    kept: SVector<f64, SLOW>,
+    kept: [f64; SLOW],
     /// How the swing has turned since.
     turned: [f64; 2],
     /// What each state takes of the innovation.
-    gain: State,
+    gain: [f64; STATES],
     /// Whether the processes show in it.
     shows: f64,
     /// Of the white noise.
@@ -42,17 +54,27 @@ struct Row {
 
 impl Row {
     /// The states a row on.
-    fn moves(&self, state: &mut State) {
-        for j in 0..SLOW {
-            state[j] *= self.kept[j];
+    fn moves<T: Lane>(&self, state: &mut [T; STATES]) {
+        for (state, kept) in state.iter_mut().zip(self.kept) {
+            *state = *state * kept;
         }
         let ([cos, sin], [x, y]) = (self.turned, [state[SLOW], state[SLOW + 1]]);
-        (state[SLOW], state[SLOW + 1]) = (cos * x + sin * y, cos * y - sin * x);
+        (state[SLOW], state[SLOW + 1]) = (x * cos + y * sin, y * cos - x * sin);
     }
 
     /// What the row shows of the states.
-    fn shown(&self, state: &State) -> f64 {
-        self.shows * state.fixed_rows::<SLOW>(0).sum() + state[SLOW]
+    fn shown<T: Lane>(&self, state: &[T; STATES]) -> T {
+        ((state[0] + state[1]) + (state[2] + state[3])) * self.shows + state[SLOW]
+    }
+
+    /// The innovation of a value, which the states take up.
+    fn innovation<T: Lane>(&self, value: T, state: &mut [T; STATES]) -> T {
+        self.moves(state);
+        let innovation = value - self.shown(state);
+        for (state, gain) in state.iter_mut().zip(self.gain) {
+            *state = *state + innovation * gain;
+        }
+        innovation * self.deviation.recip()
     }
 }
 
@@ -95,9 +117,9 @@ impl Whitening {
                 let (sin, cos) = (std::f64::consts::TAU * line.hz * since_s.unwrap_or(0.0)).sin_cos();
                 let mut row = Row {
                     point,
-                    kept: SVector::from_fn(|j, _| kept_for(LONG_S[j])),
+                    kept: LONG_S.map(kept_for),
                     turned: [cos, sin].map(|x| x * kept_for(PHASE_KEPT_S)),
-                    gain: State::zeros(),
+                    gain: [0.0; STATES],
                     shows: f64::from(u8::from(shows(point))),
                     white: deviation[point],
                     deviation: 0.0,
@@ -106,7 +128,7 @@ impl Whitening {
                 for _ in 0..2 {
                     for j in 0..STATES {
                         let mut column: State = variance.column(j).into_owned();
-                        row.moves(&mut column);
+                        row.moves(&mut column.data.0[0]);
                         variance.set_column(j, &column);
                     }
                     variance = variance.transpose();
@@ -115,11 +137,12 @@ impl Whitening {
                     let kept = if j < SLOW { row.kept[j] } else { kept_for(PHASE_KEPT_S) };
                     variance[(j, j)] += stationary[j] * (1.0 - kept * kept);
                 }
-                let seen = State::from_fn(|j, _| row.shown(&variance.column(j).into_owned()));
-                let of_innovation = row.white.powi(2) + row.shown(&seen);
-                row.gain = seen / of_innovation;
+                let seen = State::from_fn(|j, _| row.shown(&variance.column(j).into_owned().data.0[0]));
+                let of_innovation = row.white.powi(2) + row.shown(&seen.data.0[0]);
+                let gain = seen / of_innovation;
+                row.gain = gain.data.0[0];
                 row.deviation = of_innovation.sqrt();
-                variance -= row.gain * seen.transpose();
+                variance -= gain * seen.transpose();
                 rows.push(row);
                 before = Some(point);
             }
@@ -142,25 +165,59 @@ impl Whitening {
         if !self.coloured {
             return self.rows.iter().map(|row| values[row.point] / row.deviation).collect();
         }
-        self.innovations(|row| values[row.point]).collect()
+        let mut state = [0.0; STATES];
+        self.rows.iter().map(|row| row.innovation(values[row.point], &mut state)).collect()
     }
 
-    /// The same of a series over the white noise's deviation, by point: 0 where there is no row.
+    /// The same of columns.
+    pub(super) fn of_columns(&self, columns: &[&Vec<f64>]) -> Vec<Vec<f64>> {
+        if !self.coloured {
+            return columns.iter().map(|column| self.of(column)).collect();
+        }
+        let of_lanes = |lanes: &[&Vec<f64>]| {
+            let mut out = vec![Vec::with_capacity(self.rows.len()); lanes.len()];
+            let value = |lane: usize, row: &Row| lanes[lane][row.point];
+            self.innovations(lanes.len(), value, |lane, _, innovation| out[lane].push(innovation));
+            out
+        };
+        columns.par_chunks(LANES).flat_map_iter(of_lanes).collect()
+    }
+
+    /// The innovations of a series over the white noise's deviation, by point: 0 where there is no row.
     pub(super) fn of_relative(&self, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        let innovations = self.innovations(|row| values[row.point] * row.white);
-        self.rows.iter().zip(innovations).for_each(|(row, innovation)| out[row.point] = innovation);
+        let mut state = [0.0; STATES];
+        for row in &self.rows {
+            out[row.point] = row.innovation(values[row.point] * row.white, &mut state);
+        }
         out
     }
 
-    fn innovations(&self, value: impl Fn(&Row) -> f64) -> impl Iterator<Item = f64> {
-        let mut state = State::zeros();
-        self.rows.iter().map(move |row| {
-            row.moves(&mut state);
-            let innovation = value(row) - row.shown(&state);
-            state += row.gain * innovation;
-            innovation / row.deviation
-        })
+    /// The same of columns.
+    pub(super) fn of_relative_columns(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let of_lanes = |lanes: &[Vec<f64>]| {
+            let mut out: Vec<Vec<f64>> = lanes.iter().map(|column| vec![0.0; column.len()]).collect();
+            let value = |lane: usize, row: &Row| lanes[lane][row.point] * row.white;
+            self.innovations(lanes.len(), value, |lane, row, innovation| out[lane][row.point] = innovation);
+            out
+        };
+        columns.par_chunks(LANES).flat_map_iter(of_lanes).collect()
+    }
+
+    /// Innovations of up to [`LANES`] columns, row by row.
+    fn innovations(
+        &self,
+        columns: usize,
+        value: impl Fn(usize, &Row) -> f64,
+        mut put: impl FnMut(usize, &Row, f64),
+    ) {
+        let mut state = [f64x4::ZERO; STATES];
+        for row in &self.rows {
+            let values: [f64; LANES] =
+                std::array::from_fn(|lane| if lane < columns { value(lane, row) } else { 0.0 });
+            let new = row.innovation(f64x4::from(values), &mut state).to_array();
+            (0..columns).for_each(|lane| put(lane, row, new[lane]));
+        }
     }
 }
 
@@ -233,6 +290,23 @@ mod tests {
         let by_point = whitening.of_relative(&relative);
         assert_eq!(by_point.iter().step_by(2).copied().collect::<Vec<f64>>(), whitening.of(&values));
         assert!(by_point.iter().skip(1).step_by(2).all(|x| *x == 0.0));
+    }
+
+    #[test]
+    fn columns_go_through_beside_each_other_as_each_does_alone() {
+        let line = Some(Line { hz: 50.0, variance: 2.0 });
+        let logs = [(0..100).collect(), (110..200).collect()].map(|points| LogPoints {
+            points,
+            step_s: STEP_S,
+            line,
+        });
+        let whitening = Whitening::new(&logs, &[0.5; 200], |i| i % 7 != 0, 0.3);
+        let column = |seed: u64| (0..200).scan(White::new(seed), |white, _| Some(white.next())).collect();
+        let columns: Vec<Vec<f64>> = (0..6).map(column).collect();
+        let each: Vec<Vec<f64>> = columns.iter().map(|column| whitening.of(column)).collect();
+        assert_eq!(whitening.of_columns(&columns.iter().collect::<Vec<_>>()), each);
+        let each: Vec<Vec<f64>> = columns.iter().map(|column| whitening.of_relative(column)).collect();
+        assert_eq!(whitening.of_relative_columns(&columns), each);
     }
 
     #[test]

@@ -56,16 +56,21 @@ impl Curve {
         self.values[ENTRIES - 1]
     }
 
-    /// g′(w) within a cell of the table, 1/(m/s).
+    /// g(w), and g′(w) within a cell of the table, 1/(m/s).
     #[inline]
-    pub fn derivative(&self, slip_m_s: f64) -> f64 {
+    pub fn at_with_derivative(&self, slip_m_s: f64) -> (f64, f64) {
+        let first = SLOWEST_M_S.to_bits() >> REST_BITS;
         let bits = slip_m_s.max(SLOWEST_M_S).to_bits() >> REST_BITS;
-        let cell = (bits - (SLOWEST_M_S.to_bits() >> REST_BITS)) as usize;
+        let cell = (bits - first) as usize;
         if cell + 2 >= ENTRIES {
-            return 0.0;
+            return (self.at_speed(), 0.0);
         }
-        let width = f64::from_bits((bits + 1) << REST_BITS) - f64::from_bits(bits << REST_BITS);
-        (self.values[cell + 2] - self.values[cell + 1]) / width
+        let [edge, next] = [bits, bits + 1].map(|bits| f64::from_bits(bits << REST_BITS));
+        let derivative = (self.values[cell + 2] - self.values[cell + 1]) / (next - edge);
+        if slip_m_s <= SLOWEST_M_S {
+            return (self.at(slip_m_s), derivative);
+        }
+        (self.values[cell + 1] + derivative * (slip_m_s - edge), derivative)
     }
 
     /// |g′(w)|, 1/(m/s).
@@ -141,14 +146,15 @@ mod tests {
             // Nothing slides faster than the table's end, and below its begin the root has an endless slope.
             let allowed = if w < SLOWEST_M_S { 1e-3 } else { 4e-5 };
             assert!((curve.at(w) - law(w.min(32.0))).abs() < allowed, "{w}: {} for {}", curve.at(w), law(w));
+            assert!((curve.at_with_derivative(w).0 - curve.at(w)).abs() < 1e-12);
         }
         assert!(
             (curve.slope(0.1) - 0.6 * 0.5 / (0.1f64 * 0.3).sqrt() * (-(0.1f64 / 0.3).sqrt()).exp()).abs()
                 < 2e-3
         );
-        let slope = curve.derivative(0.1);
+        let slope = curve.at_with_derivative(0.1).1;
         assert!((slope / -curve.slope(0.1) - 1.0).abs() < 0.02, "{slope}");
-        assert_eq!(curve.derivative(40.0), 0.0);
+        assert_eq!(curve.at_with_derivative(40.0), (curve.at_speed(), 0.0));
         assert_eq!(curve.at(0.0), curve.values[0]);
     }
 }

@@ -18,8 +18,6 @@
 
 use std::borrow::Cow;
 
-use rayon::prelude::*;
-
 use super::law::Contact;
 use super::log::ContactLog;
 use super::problem::{FREEDOM, Prediction};
@@ -228,13 +226,15 @@ impl Noise {
         self.repeated = (samples / self.temper).max(1.0);
     }
 
-    /// What residuals have to be multiplied with where of the channel's noise only these shares of its variance are left.
-    pub fn scales<'n>(&'n self, left: impl Iterator<Item = f64> + 'n) -> impl Iterator<Item = f64> + 'n {
-        self.of_channel.iter().zip(left).map(|(share, left)| (1.0 + share * (left - 1.0)).sqrt().recip())
+    /// What the residual of a sample has to be multiplied with where of the channel's noise only this share of its variance is
+    /// left.
+    #[inline]
+    pub fn scale(&self, sample: usize, left: f64) -> f64 {
+        if left == 1.0 { 1.0 } else { (1.0 + self.of_channel[sample] * (left - 1.0)).sqrt().recip() }
     }
 
-    /// Measured less predicted, without what the channel was seen to swing with; all logs on end, N m.
-    pub fn innovations(&self, mut residual: Vec<f64>) -> Vec<f64> {
+    /// Takes from what is measured less predicted what the channel was seen to swing with; all logs on end, N m.
+    pub fn innovations(&self, residual: &mut [f64]) {
         let mut from = 0;
         for (filter, count) in &self.filters {
             let own = from..from + count;
@@ -243,7 +243,6 @@ impl Noise {
                 filter.innovations(&mut residual[own]);
             }
         }
-        residual
     }
 
     /// With factors and effective sample size that were fitted to other logs of the same rig.
@@ -272,7 +271,7 @@ impl Noise {
         if !self.whitening.is_coloured() {
             return columns;
         }
-        columns.into_par_iter().map(|column| self.whitening.of_relative(&column)).collect()
+        self.whitening.of_relative_columns(&columns)
     }
 
     /// Variance of the slow processes together that a sample shows, where the residuals (over the present deviations) have them.

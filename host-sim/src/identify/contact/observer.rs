@@ -140,6 +140,21 @@ struct Block {
     branched: bool,
 }
 
+/// States of the block at each sample.
+struct Ways {
+    /// u, m.
+    block_m: Vec<f64>,
+    /// e_b, m; nothing without branches.
+    branches_m: Vec<[f64; 3]>,
+}
+
+impl Ways {
+    #[inline]
+    fn branches_m(&self, i: usize) -> [f64; 3] {
+        if self.branches_m.is_empty() { [0.0; 3] } else { self.branches_m[i] }
+    }
+}
+
 /// Derivatives of the cubic at the step's begin, in steps: rows for orders 0 to 3 over the forces i − 2 to i + 1.
 const CUBIC: [[f64; 4]; 4] =
     [[0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 0.5, 0.0], [2.0, -5.0, 4.0, -1.0], [-3.0, 9.0, -9.0, 3.0]];
@@ -182,21 +197,36 @@ impl Block {
         }
     }
 
-    /// Over the step that ends at sample `i`.
-    #[inline]
-    fn step(&self, state: &mut SVector<f64, 4>, force_n: &[f64], i: usize) {
-        let last = force_n.len() - 1;
-        let forces = [force_n[i.max(2) - 2], force_n[i - 1], force_n[i], force_n[(i + 1).min(last)]];
+    /// From a way of the block under this force; the branches begin relaxed.
+    fn ways(&self, from_m: f64, force_n: &[f64]) -> Ways {
+        let n = force_n.len();
+        // Over the step that ends at sample i.
+        let forces =
+            |i: usize| [force_n[i.max(2) - 2], force_n[i - 1], force_n[i], force_n[(i + 1).min(n - 1)]];
+        let mut ways = Ways { block_m: Vec::with_capacity(n), branches_m: Vec::new() };
+        ways.block_m.push(from_m);
         if self.branched {
-            let mut next = self.transition * *state;
-            for (by, force) in self.by_force.iter().zip(forces) {
-                next += by * force;
+            let mut state = SVector::<f64, 4>::new(from_m, 0.0, 0.0, 0.0);
+            ways.branches_m.push([0.0; 3]);
+            for i in 1..n {
+                let mut next = self.transition * state;
+                for (by, force) in self.by_force.iter().zip(forces(i)) {
+                    next += by * force;
+                }
+                state = next;
+                ways.block_m.push(state[0]);
+                ways.branches_m.push([state[1], state[2], state[3]]);
             }
-            *state = next;
         } else {
-            let by: f64 = self.by_force.iter().zip(forces).map(|(by, force)| by[0] * force).sum();
-            state[0] = self.transition[(0, 0)] * state[0] + by;
+            let (kept, by) = (self.transition[(0, 0)], self.by_force.map(|by| by[0]));
+            let mut block_m = from_m;
+            for i in 1..n {
+                let [f0, f1, f2, f3] = forces(i);
+                block_m = kept * block_m + ((by[0] * f0 + by[1] * f1) + (by[2] * f2 + by[3] * f3));
+                ways.block_m.push(block_m);
+            }
         }
+        ways
     }
 }
 
@@ -217,15 +247,7 @@ impl OwnNoise {
         let mut impulse = vec![0.0; SAMPLES];
         impulse[AT] = 1.0;
         let force = shifted(&smoothed_flat(&impulse, OBSERVED_OVER), late);
-        let mut state = SVector::<f64, 4>::zeros();
-        let block_m: Vec<f64> = (0..SAMPLES)
-            .map(|i| {
-                if i > 0 {
-                    block.step(&mut state, &force, i);
-                }
-                state[0]
-            })
-            .collect();
+        let block_m = block.ways(0.0, &force).block_m;
         let rate = |i: usize| contact.damping_n_s_per_m * (block_m[i + 1] - block_m[i - 1]) / (2.0 * step_s);
         let rates: Vec<f64> = (1..SAMPLES - 1).map(rate).collect();
         let shown = shifted(&rates, -late);
@@ -260,8 +282,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     // While the tip sticks the bristles take their share of the root's way.
     let share = 1.0 / (1.0 + k / contact.bristles_n_per_m);
     let force = drive.force_n;
-    let mut start = SVector::<f64, 4>::zeros();
-    start[0] = force[0] / k;
+    let ways = block.ways(force[0] / k, force);
 
     let coulomb = contact.curve.at_speed();
     let least_load = least_load_n(drive);
@@ -279,33 +300,21 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let seen_by = |lost: f64, load: f64| at_rest + lost * (load * coulomb / force_noise_n).powi(2);
     let mut variance = seen_by(lost, drive.load_n[0]);
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
-    // One sample ahead, so that the slip is even about each: means before and after it, or the law is late by half a step.
-    let after = |state: &SVector<f64, 4>, i: usize| {
-        let mut next = *state;
-        block.step(&mut next, force, i);
-        (next, (drive.root_m[i] - drive.root_m[i - 1] - (next[0] - state[0])) / dt)
-    };
-    let (mut next, mut slips_next) = after(&start, 1);
-    let mut held = start;
+    let (mut held_m, mut held_branches_m) = (ways.block_m[0], ways.branches_m(0));
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     // Between samples that are far apart the force is not noise but a guess.
     let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt, drive.late));
+    let motion = Motion { root_m: drive.root_m, block_m: &ways.block_m, rate: 1.0 / dt };
+    motion.slip_speeds(&mut out.slip_m_s);
+    slides(&motion, drive, coulomb, threshold, &mut out);
     out.force_n[0] = force[0];
     for i in 1..n {
-        let (observed, slipped) = (next, slips_next);
-        if i + 1 < n {
-            (next, slips_next) = after(&observed, i + 1);
-        }
-        let way = drive.root_m[i] - drive.root_m[i - 1];
-        let v = 0.5 * (way + drive.root_m[(i + 1).min(n - 1)] - drive.root_m[i.min(n - 2)]) / dt;
-        let w = 0.5 * (slipped + slips_next);
-        out.slip_m_s[i] = w;
+        let w = out.slip_m_s[i];
         let speed = w.abs();
         let load = drive.load_n[i];
         if load <= least_load {
-            held = observed;
-            out.force_n[i] = 0.0;
+            (held_m, held_branches_m) = (ways.block_m[i], ways.branches_m(i));
             out.sliding[i] = 1.0;
             continue;
         }
@@ -313,33 +322,27 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         if let Some(ageing) = contact.ageing {
             loaded *= ageing.factor(age);
         }
-        let sign = if w > 0.0 { 1.0 } else { -1.0 };
-        let resisting = sign * force[i] / (load * coulomb);
-        let fast = sigmoid((speed / threshold - 1.0) / WIDTH);
-        let slips = if fast > 0.0 {
-            fast * sigmoid((speed / (v.abs() + 1e-3 * threshold) / LEAST_SHARE - 1.0) / WIDTH)
-                * sigmoid((resisting / LEAST_FORCE - 1.0) / WIDTH)
-        } else {
-            0.0
-        };
-        out.sliding[i] = slips;
-
-        lost = if drive.at_end(i) { 1.0 } else { lost * forgets };
-        let observed_variance = seen_by(lost, load);
-        if let (Some(own), true) = (&own_noise, slips > NEGLIGIBLE) {
-            let slope = loaded * contact.curve.derivative(speed) + per_load * load + film;
-            out.own_noise[i] += slips * (own.left(-slope / c) - 1.0);
+        let slips = out.sliding[i];
+        if drive.ends.is_some() {
+            lost = if drive.at_end(i) { 1.0 } else { lost * forgets };
         }
+        let observed_variance = seen_by(lost, load);
         let sliding = if slips > NEGLIGIBLE {
-            sign * (loaded * contact.curve.at(speed) + (per_load * load + film) * speed)
+            let (coefficient, derivative) = contact.curve.at_with_derivative(speed);
+            let viscous = per_load * load + film;
+            if let Some(own) = &own_noise {
+                out.own_noise[i] += slips * (own.left(-(loaded * derivative + viscous) / c) - 1.0);
+            }
+            1f64.copysign(w) * (loaded * coefficient + viscous * speed)
         } else {
             0.0
         };
         if slips < 1.0 - NEGLIGIBLE {
+            let (way, v) = (motion.way_m(i), motion.root_m_s(i));
             let moved = share * way;
-            let mut sticking = k * (held[0] + moved) + c * share * v;
+            let mut sticking = k * (held_m + moved) + c * share * v;
             for b in 0..3 {
-                sticking += contact.branches[b].0 * (held[1 + b] + moved) * branch[b];
+                sticking += contact.branches[b].0 * (held_branches_m[b] + moved) * branch[b];
             }
             // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
             // Slower than what counts as slip it is friction at the slip's speed, its noise taken off.
@@ -364,13 +367,16 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let stuck = if drive.at_end(i) { before } else { gain };
             let follows = slips + (1.0 - slips) * breaks;
             variance = follows * observed_variance + (1.0 - follows) * stuck;
-            held[0] = follows * observed[0] + (1.0 - follows) * (held[0] + moved + pulled);
+            held_m = follows * ways.block_m[i] + (1.0 - follows) * (held_m + moved + pulled);
+            let observed_m = ways.branches_m(i);
             for b in 0..3 {
-                held[1 + b] = follows * observed[1 + b] + (1.0 - follows) * (held[1 + b] + moved) * branch[b];
+                held_branches_m[b] =
+                    follows * observed_m[b] + (1.0 - follows) * (held_branches_m[b] + moved) * branch[b];
             }
             out.force_n[i] = slips * sliding + (1.0 - slips) * sticking;
         } else {
-            (held, variance) = (observed, observed_variance);
+            (held_m, held_branches_m) = (ways.block_m[i], ways.branches_m(i));
+            variance = observed_variance;
             out.force_n[i] = sliding;
         }
         if let Some(ageing) = contact.ageing {
@@ -379,6 +385,63 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         }
     }
     out
+}
+
+/// The root and the block that it pulls.
+struct Motion<'m> {
+    root_m: &'m [f64],
+    block_m: &'m [f64],
+    /// Samples a second.
+    rate: f64,
+}
+
+impl Motion<'_> {
+    /// Way of the root over the step that ends at a sample, m.
+    #[inline]
+    fn way_m(&self, i: usize) -> f64 {
+        self.root_m[i] - self.root_m[i - 1]
+    }
+
+    /// Speed of the root, even about a sample, m/s.
+    #[inline]
+    fn root_m_s(&self, i: usize) -> f64 {
+        let last = self.root_m.len() - 1;
+        0.5 * self.rate * (self.way_m(i) + self.root_m[(i + 1).min(last)] - self.root_m[i.min(last - 1)])
+    }
+
+    /// Speed of the slip, even about each sample: means before and after it, or the law is late by half a step.
+    fn slip_speeds(&self, slip_m_s: &mut [f64]) {
+        let last = self.root_m.len() - 1;
+        let way = |i: usize| self.root_m[i] - self.block_m[i];
+        for (i, slip) in slip_m_s.iter_mut().enumerate().take(last).skip(1) {
+            *slip = 0.5 * self.rate * (way(i + 1) - way(i - 1));
+        }
+        slip_m_s[last] = self.rate * (way(last) - way(last - 1));
+    }
+}
+
+/// Share of slip in the blend at each sample but the first.
+fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, threshold: f64, out: &mut Observed) {
+    let steep = 1.0 / WIDTH;
+    let by_speed = steep / threshold;
+    let by_share = steep / LEAST_SHARE;
+    let by_force = steep / (LEAST_FORCE * coulomb);
+    for i in 1..motion.root_m.len() {
+        let w = out.slip_m_s[i];
+        let speed = w.abs();
+        let fast = by_speed * speed - steep;
+        out.sliding[i] = if fast < -SATURATED {
+            0.0
+        } else {
+            let share = by_share * speed / (motion.root_m_s(i).abs() + 1e-3 * threshold) - steep;
+            let resisting = by_force * drive.force_n[i] * 1f64.copysign(w) / drive.load_n[i] - steep;
+            if fast.min(share).min(resisting) > SATURATED {
+                1.0
+            } else {
+                sigmoid(fast) * sigmoid(share) * sigmoid(resisting)
+            }
+        };
+    }
 }
 
 #[cfg(test)]

@@ -341,21 +341,24 @@ impl<'a> Problem<'a> {
     }
 
     fn scaled(&self, prediction: &Prediction) -> Vec<f64> {
-        let usable = self.logs.iter().flat_map(|log| log.usable.iter()).zip(&self.noise.known);
-        let certainty = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
-        let own_noise = prediction.observed.iter().flat_map(|observed| observed.own_noise.iter().copied());
-        let scales = certainty.zip(self.noise.scales(own_noise)).map(|(certainty, scale)| certainty * scale);
-        let left = self.measured().zip(&prediction.shown_nm).zip(scales).map(|((y, x), c)| c * (y - x));
-        let mut left: Vec<f64> = left.collect();
+        let mut left = Vec::with_capacity(prediction.shown_nm.len());
+        for (log, observed) in self.logs.iter().zip(&prediction.observed) {
+            let from = left.len();
+            left.extend(log.friction_nm.iter().enumerate().map(|(i, measured_nm)| {
+                let scale = observed.certainty[i] * self.noise.scale(from + i, observed.own_noise[i]);
+                scale * (measured_nm - prediction.shown_nm[from + i])
+            }));
+        }
         if let Some(mode) = prediction.ringing {
             self.behind_mode(&mut left, mode);
         }
-        let left = self.noise.innovations(left);
-        left.into_iter()
-            .zip(&self.noise.deviation)
-            .zip(usable)
-            .map(|((e, s), (usable, known))| if *usable && *known { e / s } else { 0.0 })
-            .collect()
+        self.noise.innovations(&mut left);
+        let usable = self.logs.iter().flat_map(|log| &log.usable);
+        let of_noise = self.noise.deviation.iter().zip(&self.noise.known);
+        for ((left, (deviation, known)), usable) in left.iter_mut().zip(of_noise).zip(usable) {
+            *left = if *usable && *known { *left / deviation } else { 0.0 };
+        }
+        left
     }
 
     /// Takes off what the sensor's mode is seen to ring with for what is uncertain of the force.
@@ -389,10 +392,7 @@ impl<'a> Problem<'a> {
 
     /// −ln likelihood, but for constants.
     pub fn misfit(&self, r: &[f64]) -> f64 {
-        let new = self.noise.whitened(r);
-        // The logarithm of a product in place of a sum of logarithms.
-        let each = new.chunks(8).map(|r| r.iter().map(|r| 1.0 + r * r / FREEDOM).product::<f64>().ln());
-        0.5 * (FREEDOM + 1.0) * each.sum::<f64>() / self.noise.temper
+        0.5 * (FREEDOM + 1.0) * linear::sum_of_logs(&self.noise.whitened(r), FREEDOM) / self.noise.temper
     }
 
     /// −∂r/∂p at a point, a column for each parameter.

@@ -237,13 +237,17 @@ fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
     kept
 }
 
-fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, rounds: &[(usize, usize)]) -> Vec<Fit> {
-    for &(keep, iterations) in rounds {
-        fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        fits.truncate(keep);
-        fits = fits.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, iterations, None)).collect();
-    }
-    unique(fits)
+/// The best ones fitted on, from slopes that are near.
+fn improved(
+    problem: &Problem<'_>,
+    mut fits: Vec<Fit>,
+    (keep, iterations): (usize, usize),
+    slopes: Option<&Slopes>,
+) -> Vec<Fit> {
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    fits.truncate(keep);
+    let again = |fit: Fit| problem.fit(&fit.terms, fit.p, iterations, slopes);
+    unique(fits.into_par_iter().map(again).collect())
 }
 
 /// The best single terms, and for each nonlinear one the points where it stood after a few iterations.
@@ -269,13 +273,13 @@ fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Ve
             known[fit.terms[0]].get_or_insert_with(Vec::new).push(fit.p[base.p.len()..].to_vec());
         }
     }
-    let mut fits = improved(problem, tried, &[(16, 3)]);
+    let mut fits = improved(problem, tried, (16, 3), Some(&slopes));
     // The laws of the effects that lead: a law bends as its columns cannot.
     let leading: Vec<&str> =
         fits.iter().take(PARENTS).map(|fit| problem.terms[fit.terms[0]].effect).collect();
     let laws = |term: &usize| problem.terms[*term].law && leading.contains(&problem.terms[*term].effect);
     fits.extend(first((0..problem.terms.len()).filter(laws).collect()));
-    (improved(problem, fits, &[(10, 5)]), known)
+    (improved(problem, fits, (10, 5), None), known)
 }
 
 /// The set with each of its terms in the form that can be exported.
@@ -453,7 +457,7 @@ fn children(problem: &Problem<'_>, denied: &[usize], parents: &[Fit], known: &[O
         .into_par_iter()
         .map(|(terms, slopes, start)| problem.fit(&terms, start, FIRST_STEPS, Some(slopes)))
         .collect();
-    bent(problem, improved(problem, first, &[(6, 5)]))
+    bent(problem, improved(problem, first, (6, 5), None))
 }
 
 /// All of these sets with their evidence, best first; of those that were ranked under the same noise it is known.

@@ -6,19 +6,18 @@
 //!
 //! The noisy side is the response: torques carry the noise, angles little of it.
 
+mod search;
+mod solve;
+
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
+use nalgebra::DMatrix;
 
+pub use self::search::{Company, Propose, search};
 use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
-use super::contact::search::WORTH;
-use super::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
 use super::filters::{self, deviation_by_median, local_maximum, median_magnitude};
-use super::linear;
 use super::noise;
-use super::same_amplitude::{Seen, log_ratio};
 use super::slow_noise;
 use super::term::Parameter;
 use super::variance_components::{self, Sample};
@@ -125,6 +124,9 @@ pub struct Balance {
     pub temper: f64,
     /// What is new in each row.
     pub(super) whitening: Whitening,
+    /// The same of the response and of the base's columns.
+    white_response: Vec<f64>,
+    white_base: Vec<Vec<f64>>,
     /// Width of the widest log's filter, samples.
     pub filter_samples: f64,
     /// Whether the response has quiet stretches; what may ripple all the time has none.
@@ -154,17 +156,9 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
-/// Steps of the reweighted least squares at most, and the square of one, in deviations of the posterior, that changes the
-/// evidence by half of it: nothing depends on less.
-const MOST_ITERATIONS: usize = 10;
-const CONVERGED: f64 = 1e-3;
 /// Stretches in which a balance's response shows its noise, in widths of its filter: eighteen samples that do not count as one
 /// another, a quarter of a second at 1 kHz, for which a plan mostly holds its speed.
 const STRETCH_WIDTHS: f64 = 64.0;
-/// Shapes of a combination of effects that are solved, of those that a glance ranks.
-const SHAPES: usize = 2;
-/// What is held moves by no more than this share of its prior's deviation: no signal tells it so well.
-const HELD: f64 = 1e-4;
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 
@@ -183,6 +177,8 @@ pub struct Solved {
     pub log_evidence: f64,
     /// Residuals of all points, in the response's unit.
     pub residual: Vec<f64>,
+    /// What is new in each row of them, over its deviation.
+    pub(super) innovations: Vec<f64>,
 }
 
 impl Solved {
@@ -253,6 +249,8 @@ impl Balance {
             bridge_zero: 0.0,
             temper: FIRST_TEMPER,
             whitening: Whitening::default(),
+            white_response: Vec::new(),
+            white_base: Vec::new(),
             filter_samples: logs.iter().map(|log| log.width).fold(1.0, f64::max),
             rests: true,
             row_step_s,
@@ -271,165 +269,21 @@ impl Balance {
         let logs: Vec<LogPoints> =
             logs.into_iter().map(|points| LogPoints { points, step_s, line: None }).collect();
         self.whitening = Whitening::new(&logs, &self.deviation, |_| true, of_each);
+        self.white_response = self.whitening.of(&self.response);
+        let base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
+        self.white_base = self.whitening.of_columns(&base);
+    }
+
+    /// As one whose response may ripple all the time.
+    #[must_use]
+    pub fn without_rests(self) -> Self {
+        Self { rests: false, ..self }
     }
 
     /// With the base's parameters from this place on as errors of the sensors, and the deviation of its bridge's zero.
     #[must_use]
     pub fn with_sensors(self, sensors: usize, bridge_zero: f64) -> Self {
         Self { sensors, bridge_zero, ..self }
-    }
-
-    /// Solves a set of alternatives.
-    pub fn solve(&self, alternatives: &[Alternative], set: &[usize]) -> Solved {
-        self.solve_set(alternatives, set, None, MOST_ITERATIONS)
-    }
-
-    /// The same from the weights of a solution that is near, in so many steps; with one, not reweighted, shapes compare.
-    fn solve_set(
-        &self,
-        alternatives: &[Alternative],
-        set: &[usize],
-        near: Option<&Solved>,
-        iterations: usize,
-    ) -> Solved {
-        let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
-        let base = self.base.iter().map(|b| b.0.clone()).collect();
-        Solved { set: set.to_vec(), ..self.solved(base, &chosen, near, iterations) }
-    }
-
-    /// Of what a solution takes for errors of the sensors as much as they are known to have: a deviation of each.
-    pub fn possible_errors(&self, values: &[f64]) -> Vec<f64> {
-        let sensors = self.base.iter().zip(values).skip(self.sensors);
-        sensors.map(|((q, _), value)| value.clamp(q.mean - q.sd, q.mean + q.sd)).collect()
-    }
-
-    /// What a solution leaves without its errors of the sensors.
-    pub fn left_by_causes(&self, solved: &Solved) -> Vec<f64> {
-        let mut left = solved.residual.clone();
-        for ((_, column), value) in self.base.iter().zip(&solved.p).skip(self.sensors) {
-            left.iter_mut().zip(column).for_each(|(left, x)| *left += value * x);
-        }
-        left
-    }
-
-    /// What a set leaves beside these errors of the sensors.
-    pub fn left_beside_errors(
-        &self,
-        errors: &[f64],
-        alternatives: &[Alternative],
-        set: &[usize],
-    ) -> Vec<f64> {
-        let chosen: Vec<&Alternative> = set.iter().map(|a| &alternatives[*a]).collect();
-        let mut parameters: Vec<Parameter> = self.base.iter().map(|b| b.0.clone()).collect();
-        for (q, error) in parameters.iter_mut().skip(self.sensors).zip(errors) {
-            (q.mean, q.sd) = (*error, HELD * q.sd);
-        }
-        self.solved(parameters, &chosen, None, MOST_ITERATIONS).residual
-    }
-
-    /// Solves these forms; the set of what it gives is empty.
-    pub fn solve_forms(&self, chosen: &[&Alternative]) -> Solved {
-        self.solve_near(chosen, None)
-    }
-
-    /// The same from the weights of a solution that is near.
-    pub fn solve_near(&self, chosen: &[&Alternative], near: Option<&Solved>) -> Solved {
-        self.solved(self.base.iter().map(|b| b.0.clone()).collect(), chosen, near, MOST_ITERATIONS)
-    }
-
-    /// The same with these priors of the base.
-    fn solved(
-        &self,
-        mut parameters: Vec<Parameter>,
-        chosen: &[&Alternative],
-        near: Option<&Solved>,
-        iterations: usize,
-    ) -> Solved {
-        let mut response = self.response.clone();
-        let base = self.base.iter().map(|b| &b.1);
-        let mut log_prior = 0.0;
-        for alternative in chosen {
-            if let Some(added) = &alternative.response {
-                response.iter_mut().zip(added).for_each(|(y, a)| *y += a);
-            }
-            for (place, shift) in &alternative.base_shift {
-                parameters[*place].mean += shift;
-            }
-            log_prior += alternative.log_prior;
-        }
-        parameters.extend(chosen.iter().flat_map(|a| a.parameters.iter().cloned()));
-        let columns: Vec<&Vec<f64>> = base.chain(chosen.iter().flat_map(|a| a.columns.iter())).collect();
-
-        let y = self.whitening.of(&response);
-        let x: Vec<Vec<f64>> = columns.iter().map(|c| self.whitening.of(c)).collect();
-        let n = parameters.len();
-        let weight = |r: f64| (FREEDOM + 1.0) / (FREEDOM + r * r);
-        let of_near = |near: &Solved| self.whitening.of(&near.residual).into_iter().map(weight).collect();
-        let mut w: Vec<f64> = near.map_or_else(|| vec![1.0; y.len()], of_near);
-        let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
-        let mut r = y.clone();
-        let (mut h, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
-        for _ in 0..iterations {
-            w.iter_mut().for_each(|w| *w /= self.temper);
-            (h, slope) = linear::normal_equations(&x, &w, &y);
-            let mut g = slope.clone();
-            let mut a = h.clone();
-            for (i, q) in parameters.iter().enumerate() {
-                let width = q.width(TYPICAL_SCALE);
-                a[(i, i)] += 1.0 / width.powi(2);
-                g[i] += q.mean / width.powi(2);
-            }
-            let next = linear::solve_bounded(&a, &g, &lower);
-            let step = &next - DVector::from_column_slice(&p);
-            p = next.iter().copied().collect();
-            r.copy_from_slice(&y);
-            for (c, p) in x.iter().zip(&p) {
-                r.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
-            }
-            w.iter_mut().zip(&r).for_each(|(w, r)| *w = weight(*r));
-            if step.dot(&(&a * &step)) < CONVERGED {
-                break;
-            }
-        }
-        let misfit =
-            0.5 * (FREEDOM + 1.0) * r.iter().map(|r| (r * r / FREEDOM).ln_1p()).sum::<f64>() / self.temper;
-        let mut posterior = h.clone();
-        for (i, q) in parameters.iter().enumerate() {
-            posterior[(i, i)] += 1.0 / q.sd.powi(2);
-        }
-        let covariance = linear::factor(&posterior).inverse();
-        let waves = self.waves(chosen, &p, &covariance);
-        let slope = slope - &h * DVector::from_column_slice(&p);
-        let parameters: Vec<&Parameter> = parameters.iter().collect();
-        let at = Expansion { p: &p, parameters: &parameters, misfit, slope: &slope, curvature: &h };
-        let one_amplitude = |scale: f64| waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
-        let log_evidence = log_prior + at.log_evidence(BALANCE_SHARE, one_amplitude);
-        let mut residual = response;
-        for (c, p) in columns.iter().zip(&p) {
-            residual.iter_mut().zip(c.iter()).for_each(|(r, x)| *r -= p * x);
-        }
-        Solved { set: Vec::new(), base: self.base.len(), p, covariance, log_evidence, residual }
-    }
-
-    /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.
-    fn waves(&self, chosen: &[&Alternative], p: &[f64], covariance: &DMatrix<f64>) -> Vec<(Vec<Seen>, f64)> {
-        let mut out = Vec::new();
-        for (alternative, own) in placed(chosen.iter().copied(), self.base.len()) {
-            for wave in &alternative.same_amplitude {
-                let seen = wave.iter().map(|places| {
-                    let [c, s] = places.map(|place| own.start + place);
-                    let determinant = covariance[(c, c)] * covariance[(s, s)] - covariance[(c, s)].powi(2);
-                    Seen {
-                        amplitude: p[c].hypot(p[s]),
-                        precision: BALANCE_SHARE * determinant.max(f64::MIN_POSITIVE).sqrt().recip(),
-                    }
-                });
-                let sd = wave.first().map_or(0.0, |[c, _]| alternative.parameters[*c].sd);
-                out.push((seen.collect(), sd));
-            }
-        }
-        out
     }
 
     /// The points of each log, as places in all.
@@ -545,146 +399,20 @@ impl Balance {
     }
 }
 
-/// What proposes forms: of the effects that are wanted, for what these forms leave.
-pub type Propose<'p> = &'p dyn Fn(&Balance, Company<'_>, &dyn Fn(&str) -> bool) -> Vec<Alternative>;
-
-/// Forms that stand in a balance already, and what they leave of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Company<'a> {
-    /// The forms.
-    pub forms: &'a [&'a Alternative],
-    /// The residual.
-    pub residual: &'a [f64],
-}
-
-impl<'a> Company<'a> {
-    /// The forms, and this one beside them.
-    pub fn with<'f>(&self, form: &'f Alternative) -> Vec<&'f Alternative>
-    where
-        'a: 'f,
-    {
-        self.forms.iter().copied().chain([form]).collect()
-    }
-}
-
-/// The forms that were looked for, and sets of them with their evidence, best first; the empty set is among them.
-///
-/// Orders and shapes are looked for where nothing else stands, and once more beside what was found: a mode that was fitted
-/// to another cause's torque is not the coupling's.
-pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<Alternative>, Vec<Solved>) {
-    let alone = balance.solve(&[], &[]);
-    // What no cause explains yet is no slow noise.
-    balance.refit_level(&alone, 0.0);
-    let mut alternatives = propose(balance, Company { forms: &[], residual: &alone.residual }, &|_| true);
-    balance.forget_residuals();
-    let found = search_sets(balance, &alternatives, most);
-    // What is too small to matter hides nothing.
-    if balance.difference(&found[0].residual, &alone.residual) < WORTH * balance.scale {
-        return (alternatives, found);
-    }
-    let best = &found[0].set;
-    let effect = |place: &usize| alternatives[*place].effect;
-    let mut more: Vec<Alternative> = Vec::new();
-    for again in best.iter().map(Some).chain([None]) {
-        let beside: Vec<usize> = best.iter().copied().filter(|place| Some(place) != again).collect();
-        if beside.is_empty() {
-            continue;
-        }
-        let forms: Vec<&Alternative> = beside.iter().map(|place| &alternatives[*place]).collect();
-        let residual = balance.solve(&alternatives, &beside).residual;
-        let wanted =
-            |id: &str| again.map_or(!best.iter().any(|b| effect(b) == id), |again| effect(again) == id);
-        more.extend(propose(balance, Company { forms: &forms, residual: &residual }, &wanted));
-    }
-    let same = |a: &Alternative, b: &Alternative| {
-        a.effect == b.effect && a.constants == b.constants && a.parameters.len() == b.parameters.len()
-    };
-    more.retain(|new| !alternatives.iter().any(|old| same(old, new)));
-    if more.is_empty() {
-        return (alternatives, found);
-    }
-    alternatives.extend(more);
-    balance.forget_residuals();
-    let found = search_sets(balance, &alternatives, most);
-    (alternatives, found)
-}
-
-fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
-    let empty = balance.solve(alternatives, &[]);
-    let mut all = vec![empty];
-    for round in 0..2 {
-        let mut found = vec![balance.solve(alternatives, &[])];
-        let mut parents: Vec<Solved> = found.clone();
-        for _ in 0..most {
-            let mut sets: Vec<(Vec<usize>, &Solved)> = Vec::new();
-            for parent in &parents {
-                for a in 0..alternatives.len() {
-                    let excluded = |b: &usize| {
-                        let (a, b) = (&alternatives[a], &alternatives[*b]);
-                        a.effect == b.effect || (a.is_coupling() && b.is_coupling())
-                    };
-                    if parent.set.iter().any(excluded) {
-                        continue;
-                    }
-                    let mut set = parent.set.clone();
-                    set.push(a);
-                    set.sort_unstable();
-                    if sets.iter().all(|(known, _)| *known != set) {
-                        sets.push((set, parent));
-                    }
-                }
-            }
-            // The best shape of each combination of effects leads on.
-            let glance = |(set, parent): &(Vec<usize>, &Solved)| {
-                balance.solve_set(alternatives, set, Some(*parent), 1)
-            };
-            let refit =
-                |near: &Solved| balance.solve_set(alternatives, &near.set, Some(near), MOST_ITERATIONS);
-            let best = best_shapes(alternatives, sets.par_iter().map(glance).collect(), SHAPES);
-            let solved = best_shapes(alternatives, best.par_iter().map(refit).collect(), 1);
-            parents = solved.iter().take(3).cloned().collect();
-            let best =
-                |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-            let worth = best(&solved) > best(&found);
-            found.extend(solved);
-            // A larger set is looked for where this one was worth it.
-            if !worth {
-                break;
-            }
-        }
-        found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        if round == 0 {
-            let best = found[0].clone();
-            balance.refit_noise(&best);
-        }
-        all = found;
-    }
-    all
-}
-
-/// The best of these, at most so many of each combination of effects, the best first.
-fn best_shapes(alternatives: &[Alternative], mut solved: Vec<Solved>, most: usize) -> Vec<Solved> {
-    solved.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    let mut seen: Vec<Vec<&str>> = Vec::new();
-    solved.retain(|s| {
-        let mut names: Vec<&str> = s.set.iter().map(|a| alternatives[*a].effect).collect();
-        names.sort_unstable();
-        let kept = seen.iter().filter(|known| **known == names).count() < most;
-        seen.push(names);
-        kept
-    });
-    solved
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::identify::noise::tests::white;
 
-    const ROWS: usize = 4000;
+    pub(super) const ROWS: usize = 4000;
 
     /// A balance with one base column, a slow swing, and rows whose named deviation is one.
-    fn balance(response: Vec<f64>) -> Balance {
+    pub(super) fn balance(response: Vec<f64>) -> Balance {
+        beside(response, Vec::new())
+    }
+
+    /// The same with more columns of the base.
+    fn beside(response: Vec<f64>, more: Vec<(Parameter, Vec<f64>)>) -> Balance {
         let column = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
         let log = LogRows {
             width: 1.0,
@@ -693,7 +421,8 @@ mod tests {
             noise: Box::new(|_| vec![1.0]),
             guessed: Box::new(|_| Vec::new()),
         };
-        Balance::new(response, vec![(Parameter::amplitude("swing", 10.0), column)], &[log], 1.0)
+        let base = [vec![(Parameter::amplitude("swing", 10.0), column)], more].concat();
+        Balance::new(response, base, &[log], 1.0)
     }
 
     #[test]
@@ -755,17 +484,16 @@ mod tests {
         let [white, both] = [&quick.collect(), &both].map(over);
         assert!(white.quiet_over_named_noise() < 1.1, "{}", white.quiet_over_named_noise());
         assert!(both.quiet_over_named_noise() > 1.4, "{}", both.quiet_over_named_noise());
-        let alone = Balance { rests: false, ..both };
+        let alone = both.without_rests();
         assert_eq!(alone.quiet_over_named_noise(), 1.0);
     }
 
     #[test]
     fn a_cause_with_the_shape_of_a_sensors_error_has_its_whole_size() {
         // An offset of the motor beside a bridge whose zero is known to a tenth of it.
-        let swing = balance(white(ROWS, 2).iter().map(|n| 1.0 + n).collect());
         let zero = (Parameter { amplitude: false, ..Parameter::amplitude("zero", 0.1) }, vec![1.0; ROWS]);
-        let base = swing.base.iter().cloned().chain([zero]).collect();
-        let balance = Balance { base, ..swing }.with_sensors(1, 0.1);
+        let response = white(ROWS, 2).iter().map(|n| 1.0 + n).collect();
+        let balance = beside(response, vec![zero]).with_sensors(1, 0.1);
         let column = vec![vec![1.0; ROWS]];
         let forms = [Alternative::columns("offset", vec![Parameter::amplitude("size", 10.0)], column)];
         let [with, without] = [&[0][..], &[]].map(|set| balance.solve(&forms, set));
@@ -780,48 +508,6 @@ mod tests {
         assert!((errors[0] - 0.1).abs() < 1e-12, "{errors:?}");
         let [with, without] = [&[0][..], &[]].map(|set| balance.left_beside_errors(&errors, &forms, set));
         assert!((balance.difference(&with, &without) - 0.9).abs() < 0.05);
-    }
-
-    #[test]
-    fn a_form_is_looked_for_again_beside_what_was_found() {
-        let wave = |k: f64| -> Vec<f64> { (0..ROWS).map(|i| (k * i as f64).sin()).collect() };
-        let noise = white(ROWS, 2);
-        let of = |((a, b), n): ((f64, f64), &f64)| 20.0 * a + 3.0 * b + n;
-        let response: Vec<f64> = wave(0.2).into_iter().zip(wave(0.5)).zip(&noise).map(of).collect();
-        let mut balance = balance(response);
-        let form = |effect, k: f64| Alternative {
-            constants: vec![("wave_number".into(), k)],
-            ..Alternative::columns(effect, vec![Parameter::amplitude("size", 30.0)], vec![wave(k)])
-        };
-        // The second cause's shape is seen only where the first one is taken off.
-        let propose = |_: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
-            let second = if company.forms.is_empty() { 0.7 } else { 0.5 };
-            [form("large", 0.2), form("small", second)].into_iter().filter(|f| wanted(f.effect)).collect()
-        };
-        let (alternatives, found) = search(&mut balance, &propose, 2);
-        let best: Vec<&str> = found[0].set.iter().map(|a| alternatives[*a].effect).collect();
-        assert_eq!(best.len(), 2, "{best:?}");
-        assert!((found[0].p[2] - 3.0).abs() < 0.2, "{:?}", found[0].p);
-    }
-
-    #[test]
-    fn motor_and_disc_have_one_coupling() {
-        let wave = |k: f64| -> Vec<f64> { (0..ROWS).map(|i| (k * i as f64).sin()).collect() };
-        let noise = white(ROWS, 2);
-        let of = |((a, b), n): ((f64, f64), &f64)| 9.0 * (a + b) + n;
-        let response: Vec<f64> = wave(0.2).into_iter().zip(wave(0.5)).zip(&noise).map(of).collect();
-        let form = |effect, k: f64, couples: bool| {
-            let columns =
-                Alternative::columns(effect, vec![Parameter::amplitude("size", 30.0)], vec![wave(k)]);
-            let disc = DiscMotion { angle_rad: Vec::new(), angle_per_unit: Vec::new() };
-            let response = couples.then(|| vec![0.0; ROWS]);
-            Alternative { response, disc: Some(disc), ..columns }
-        };
-        let mut balance = balance(response);
-        let best = |balance: &mut Balance, couples| {
-            search_sets(balance, &[form("spring", 0.2, couples), form("play", 0.5, couples)], 2)[0].set.len()
-        };
-        assert_eq!([best(&mut balance, false), best(&mut balance, true)], [2, 1]);
     }
 
     #[test]
