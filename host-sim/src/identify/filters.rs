@@ -144,18 +144,29 @@ const WITHIN: f64 = 3.0;
 /// rule of intersecting confidence intervals (A. Goldenshluger, A. Nemirovski, Math. Methods Statist. 6, 1997). Steps and peaks
 /// stay what they are.
 pub fn adaptively_smoothed(signal: &[f64], noise: f64) -> Vec<f64> {
-    let mut out = signal.to_vec();
+    smoothed_together([(signal, noise)])
+}
+
+/// The same of the first of two signals that follow each other: as widely as the estimates of both allow, since what is steady
+/// in the one with less noise is so in the other.
+pub fn smoothed_together<const N: usize>(signals: [(&[f64], f64); N]) -> Vec<f64> {
+    let mut out = signals[0].0.to_vec();
     let interval = |value: f64, left: f64| (value - WITHIN * left, value + WITHIN * left);
-    let mut open: Vec<Option<(f64, f64)>> = signal.iter().map(|x| Some(interval(*x, noise))).collect();
+    let first = |(signal, noise): (&[f64], f64)| -> Vec<(f64, f64)> {
+        signal.iter().map(|x| interval(*x, noise)).collect()
+    };
+    let mut within = signals.map(first);
+    let mut open = vec![true; out.len()];
     for width in WIDER {
-        let left = noise * white_share(width);
-        for (i, value) in gaussian(signal, width, 0).into_iter().enumerate() {
-            let Some((low, high)) = open[i] else { continue };
-            let own = interval(value, left);
-            let both = (low.max(own.0), high.min(own.1));
-            open[i] = (both.0 <= both.1).then_some(both);
-            if open[i].is_some() {
-                out[i] = value;
+        let smoothed = signals.map(|(signal, _)| gaussian(signal, width, 0));
+        for i in 0..out.len() {
+            for ((within, smoothed), (_, noise)) in within.iter_mut().zip(&smoothed).zip(&signals) {
+                let own = interval(smoothed[i], noise * white_share(width));
+                within[i] = (within[i].0.max(own.0), within[i].1.min(own.1));
+                open[i] &= within[i].0 <= within[i].1;
+            }
+            if open[i] {
+                out[i] = smoothed[0][i];
             }
         }
     }
@@ -386,5 +397,27 @@ mod tests {
         assert!(off[0] < 0.002 && off[1] < 0.002 && off[2] < 0.01, "{off:?}");
         // One width for all cuts the peak.
         assert!(gaussian(&signal, 4.0, 0)[1019] < 0.8);
+    }
+
+    #[test]
+    fn what_a_quieter_signal_shows_to_be_a_swing_is_not_smoothed_away() {
+        let swing = |i: usize| if (i / 500).is_multiple_of(2) { 0.0 } else { (0.12 * i as f64).sin() };
+        let signal = |noise: f64, seed: u64| -> Vec<f64> {
+            let noises = crate::identify::noise::tests::white(4000, seed);
+            noises.iter().enumerate().map(|(i, n)| swing(i) + noise * n).collect()
+        };
+        let (noisy, quiet) = (signal(0.5, 4), signal(0.02, 5));
+        // Share of the swing that is left.
+        let left = |smoothed: &[f64]| {
+            let own = |i: &usize| (i / 500) % 2 == 1;
+            let sum = |of: &dyn Fn(usize) -> f64| (0..4000).filter(own).map(of).sum::<f64>();
+            sum(&|i| smoothed[i] * swing(i)) / sum(&|i| swing(i).powi(2))
+        };
+        let (alone, together) =
+            (adaptively_smoothed(&noisy, 0.5), smoothed_together([(&noisy, 0.5), (&quiet, 0.02)]));
+        assert!(left(&alone) < 0.9 && left(&together) > 0.97, "{} {}", left(&alone), left(&together));
+        // Where neither swings, all of the noise goes that would go.
+        let noise = |smoothed: &[f64]| rms(&smoothed[1100..1400]);
+        assert!(noise(&together) < 1.2 * noise(&alone), "{} {}", noise(&together), noise(&alone));
     }
 }

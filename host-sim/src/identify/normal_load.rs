@@ -10,7 +10,8 @@ use super::bridge_zero;
 use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
 use super::filters::{
-    adaptively_smoothed, derivative_of_motion, gaussian, largest_change, local_maximum, rms, white_share,
+    adaptively_smoothed, derivative_of_motion, gaussian, largest_change, local_maximum, rms,
+    smoothed_together, white_share,
 };
 use super::noise;
 use super::term::Parameter;
@@ -66,7 +67,7 @@ impl NormalLoadLog {
         let torque_noise_nm = noise::standard_deviation(&torque_nm);
         let normal_noise_n = noise::standard_deviation(&log.normal_n);
         // Its noise would make a smaller gain look better where levels do not tell it, and pay for what makes up for that.
-        let smoothed_n = adaptively_smoothed(&log.normal_n, normal_noise_n);
+        let smoothed_n = smoothed_together([(&log.normal_n, normal_noise_n), (&torque_nm, torque_noise_nm)]);
         Some(Self {
             step_s: log.grid.step_s,
             torque_noise_nm,

@@ -3,7 +3,7 @@
 //! Coordinates: M1's angle; the mechanism's position, which the normal force shows. Where the springs are the only compliance the
 //! two are one, and a law over them is a law of the spring force: then nothing parts them. Columns as those of M2's ripple.
 
-use super::waves::{self, Waves};
+use super::waves::{self, Candidates, Waves};
 use super::{About, Effect, NormalLoadView, fixed_orders};
 use crate::identify::balance::Alternative;
 
@@ -12,6 +12,8 @@ pub(super) struct M1Ripple;
 
 /// Fewer periods over the travel are a spring's law as well as a ripple.
 const LEAST_PERIODS: f64 = 1.7;
+/// Wave numbers are a half of this part of a half period off at most: a tenth of a radian at the travel's ends.
+const PARTS: usize = 8;
 /// Most periods over the travel, and most orders at once.
 const MOST_PERIODS: usize = 60;
 const MOST_ORDERS: usize = 3;
@@ -47,14 +49,15 @@ impl Effect for M1Ripple {
             }
             let position = positions.concat();
             let travel = positions.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max);
-            let mut candidates = waves::of_travel(travel, MOST_PERIODS);
-            candidates.retain(|k| k * travel > LEAST_PERIODS * std::f64::consts::TAU);
+            let mut wave_numbers = waves::of_travel(travel, MOST_PERIODS);
+            wave_numbers.retain(|k| k * travel > LEAST_PERIODS * std::f64::consts::TAU);
+            let candidates = Candidates { wave_numbers, parts: PARTS };
             // The position dwells at the steps of the force, where a spectrum shows all orders alike.
             for own_phase in [false, true] {
                 let orders =
                     waves::joint(view.balance, &position, view.company, &candidates, MOST_ORDERS, own_phase);
                 for count in 1..=orders.len() {
-                    all.push(make.alternative(&orders[..count], candidates.len(), own_phase));
+                    all.push(make.alternative(&orders[..count], candidates.count(), own_phase));
                 }
             }
         }

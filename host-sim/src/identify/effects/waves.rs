@@ -61,7 +61,7 @@ pub fn joint(
     balance: &Balance,
     position: &[f64],
     company: Company<'_>,
-    candidates: &[f64],
+    candidates: &Candidates,
     most: usize,
     own_phase: bool,
 ) -> Vec<f64> {
@@ -75,9 +75,12 @@ pub fn joint(
     let row = |point: usize| used.partition_point(|i| *i < point);
     let stretches: Vec<Range<usize>> =
         starts.iter().zip(ends).map(|(from, end)| row(*from)..row(end)).collect();
-    let wave = |k: f64| {
-        [f64::cos as fn(f64) -> f64, f64::sin]
-            .map(|of| scaled(&position.iter().map(|x| of(k * x)).collect::<Vec<f64>>()))
+    let wave = |k: f64| -> [Vec<f64>; 2] {
+        let mut columns = [vec![0.0; position.len()], vec![0.0; position.len()]];
+        for i in used {
+            (columns[1][*i], columns[0][*i]) = (k * position[*i]).sin_cos();
+        }
+        columns.each_ref().map(|column| scaled(column))
     };
     // Columns may be nearly the same where the position dwells.
     let ridged = |mut h: DMatrix<f64>| {
@@ -119,8 +122,11 @@ pub fn joint(
             let right = right - across.transpose() * &solved;
             right.dot(&linear::factor(&left).solve(&right))
         };
-        let free = candidates.par_iter().filter(|k| !found.contains(*k)).map(|k| (explained(k), *k));
-        let Some((_, k)) = free.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        let best = |candidates: &[f64]| {
+            let free = candidates.par_iter().filter(|k| !found.contains(*k)).map(|k| (explained(k), *k));
+            free.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, k)| k)
+        };
+        let Some(k) = best(&candidates.wave_numbers).and_then(|k| best(&candidates.about(k))) else { break };
         found.push(k);
         let [cosine, sine] = wave(k);
         for rows in &stretches {
@@ -166,6 +172,28 @@ fn coefficients(x: &[f64], r: &[f64], k: f64) -> (f64, f64) {
 /// Wave numbers of a length: half a period apart over the travel, up to `periods` of it.
 pub fn of_travel(travel: f64, periods: usize) -> Vec<f64> {
     (2..2 * periods).map(|i| TAU * 0.5 * i as f64 / travel.max(1e-12)).collect()
+}
+
+/// Wave numbers that are tried, and others between them.
+pub struct Candidates {
+    /// Those that are tried, in steps of one size.
+    pub wave_numbers: Vec<f64>,
+    /// Into how many parts a step is divided about the best of them.
+    pub parts: usize,
+}
+
+impl Candidates {
+    /// How many there are in all.
+    pub fn count(&self) -> usize {
+        self.wave_numbers.len() * self.parts
+    }
+
+    /// Those that are nearer to this one than to others which are tried.
+    fn about(&self, k: f64) -> Vec<f64> {
+        let step = self.wave_numbers.get(1).map_or(0.0, |next| next - self.wave_numbers[0]);
+        let half = (self.parts / 2) as i32;
+        (-half..=half).map(|part| k + f64::from(part) * step / self.parts as f64).collect()
+    }
 }
 
 /// Position and residual at the rows of each log.
@@ -312,7 +340,7 @@ mod tests {
         };
         let base = vec![(Parameter::amplitude("base", 10.0), of_base)];
         let balance = Balance::new(residual.clone(), base, &[log(), log()], 1.0);
-        let candidates: Vec<f64> = (1..30).map(f64::from).collect();
+        let candidates = Candidates { wave_numbers: (1..30).map(f64::from).collect(), parts: 1 };
         let alone = Company { forms: &[], residual: &residual };
         let found = |own| joint(&balance, &position, alone, &candidates, 2, own);
         assert_eq!(found(true), [7.0, 12.0]);
@@ -343,10 +371,39 @@ mod tests {
             g.dot(&linear::factor(&h).solve(&g))
         };
         let best = candidates
+            .wave_numbers
             .iter()
             .copied()
             .filter(|k| *k > 3.5)
             .max_by(|a, b| explained(*a).total_cmp(&explained(*b)));
         assert_eq!(Some(found(false)[0]), best);
+    }
+
+    #[test]
+    fn a_wave_between_those_that_are_tried_leaves_nothing_for_another_one() {
+        const ROWS: usize = 3000;
+        // Over 2.3 of a position that dwells at levels, where half a period is a step of 1.37.
+        let position: Vec<f64> =
+            (0..ROWS).map(|i| 0.3 * (i / 400) as f64 + 2e-4 * (i % 400) as f64).collect();
+        let noise = white(ROWS, 3);
+        let truth = 21.0 * 1.37 + 0.55;
+        let residual: Vec<f64> =
+            position.iter().zip(&noise).map(|(x, n)| (truth * x).sin() + 0.01 * n).collect();
+        let log = LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; ROWS],
+            noise: Box::new(|_| vec![0.01]),
+            guessed: Box::new(|_| Vec::new()),
+        };
+        let base = vec![(Parameter::amplitude("base", 10.0), vec![1.0; ROWS])];
+        let balance = Balance::new(residual.clone(), base, &[log], 1.0);
+        let company = Company { forms: &[], residual: &residual };
+        let found = |parts: usize| {
+            let wave_numbers = (2..60).map(|i| 1.37 * f64::from(i)).collect();
+            joint(&balance, &position, company, &Candidates { wave_numbers, parts }, 1, false)[0]
+        };
+        assert!((found(1) - truth).abs() > 0.5, "{}", found(1));
+        assert!((found(8) - truth).abs() < 0.5 * 1.37 / 8.0, "{}", found(8));
     }
 }
