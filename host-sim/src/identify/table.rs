@@ -213,16 +213,19 @@ pub fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall
         })
         .collect();
     all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
-    // An effect below what is known is taken out of the table, the smallest first.
-    let mut too_small = Vec::new();
+    // A hypothesis with an effect below what is known is taken out of the table: beside another cause the effect may be told.
+    let mut too_small: Vec<TooSmall> = Vec::new();
     while let Some((at, over)) = all.first().and_then(|best| {
         let below = best.over_floor.iter().copied().enumerate().filter(|(_, over)| *over < 1.0);
         below.min_by(|a, b| a.1.total_cmp(&b.1))
     }) {
-        let (effect, size) = (all[0].effects[at], all[0].sizes[at]);
-        too_small.push(TooSmall { effect, size, floor: size / over.max(1e-12) });
-        all.retain(|h| !h.effects.contains(&effect));
+        let best = all.remove(0);
+        let (effect, size) = (best.effects[at], best.sizes[at]);
+        if too_small.iter().all(|known| known.effect != effect) {
+            too_small.push(TooSmall { effect, size, floor: size / over.max(1e-12) });
+        }
     }
+    too_small.retain(|known| all.first().is_none_or(|best| !best.effects.contains(&known.effect)));
     let top = all.first().map_or(0.0, |h| h.log_weight);
     all.iter_mut().for_each(|h| h.probability = (h.log_weight - top).exp());
     let mass: f64 = all.iter().map(|h| h.probability).sum();
@@ -286,6 +289,29 @@ mod tests {
         assert_eq!(told(0.0035, 99.0).effects, ["a"]);
         // A large one is none, whatever another cause leaves beside it.
         assert_eq!(told(0.05, 0.1).effects, ["a", "b"]);
+    }
+
+    #[test]
+    fn a_cause_that_is_none_alone_may_be_one_beside_another() {
+        let candidate = |place, log_evidence: f64, effects: &[(&'static str, f64)]| {
+            let of = |(effect, over_rest): &(&'static str, f64)| {
+                (*effect, LAW_FORM, Contribution { size: 0.01, over_rest: *over_rest, known: MODEL_FORM })
+            };
+            Candidate::new(place, log_evidence, effects.iter().map(of))
+        };
+        // Alone it leaves more than it explains: what the other cause does.
+        let found = |beside: f64| {
+            let pair = [("large", 2.0), ("small", beside)];
+            let candidates = vec![
+                candidate(0, 0.0, &[]),
+                candidate(1, 100.0, &[("small", 0.3)]),
+                candidate(2, 101.0, &pair),
+            ];
+            let (all, too_small) = table(&[(Part::Friction, candidates)]);
+            (all[0].effects.clone(), too_small.iter().map(|small| small.effect).collect::<Vec<_>>())
+        };
+        assert_eq!(found(1.0), (vec!["large", "small"], vec![]));
+        assert_eq!(found(0.3), (vec![], vec!["small"]));
     }
 
     #[test]
