@@ -228,13 +228,14 @@ pub fn table(parts: &[(Part, Vec<Candidate>)]) -> (Vec<Hypothesis>, Vec<TooSmall
     too_small.retain(|known| all.first().is_none_or(|best| !best.effects.contains(&known.effect)));
     let top = all.first().map_or(0.0, |h| h.log_weight);
     all.iter_mut().for_each(|h| h.probability = (h.log_weight - top).exp());
+    hand_down(&mut all);
     let mass: f64 = all.iter().map(|h| h.probability).sum();
     all.iter_mut().for_each(|h| h.probability /= mass);
-    hand_down(&mut all);
     (all, too_small)
 }
 
-/// As far as an effect of a set may be the model's form, the set without it has its probability: the largest sets first.
+/// As far as an effect of a set may be the model's form, the set without it has its probability, and where that one was taken out
+/// none has it: the largest sets first.
 fn hand_down(all: &mut [Hypothesis]) {
     for size in (1..=MOST_CAUSES).rev() {
         for at in (0..all.len()).filter(|at| all[*at].effects.len() == size).collect::<Vec<_>>() {
@@ -242,9 +243,9 @@ fn hand_down(all: &mut [Hypothesis]) {
             let Some((effect, doubt)) = doubted.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             let mut left = all[at].effects.clone();
             left.remove(effect);
+            let handed = doubt * all[at].probability;
+            all[at].probability -= handed;
             if let Some(without) = all.iter().position(|h| h.effects == left) {
-                let handed = doubt * all[at].probability;
-                all[at].probability -= handed;
                 all[without].probability += handed;
             }
         }
