@@ -143,7 +143,7 @@ pub fn errors(
         }
         let sensed = contact_part::without_normal_end(&prepared, &change);
         let load_logs: Option<Vec<NormalLoadLog>> =
-            sensed.as_ref().unwrap_or(&prepared).iter().map(NormalLoadLog::new).collect();
+            sensed.as_ref().unwrap_or(&prepared).iter().map(|log| NormalLoadLog::new(log, rig)).collect();
         if let (Some(normal_load), Some(load_logs)) = (&found.normal_load, load_logs) {
             let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
             let heard = contact.heard(Part::Pressure, &prepared, training);

@@ -171,7 +171,7 @@ impl Motors<'_> {
         let place = table(&parts).0[0].place(Part::Friction).unwrap_or(0);
         let seen = contact_part::without_normal_end(&contact.logs, &contact.change(place));
         let before = self.without_end.replace(seen.is_some());
-        let logs = seen.as_ref().unwrap_or(&contact.logs).iter().map(NormalLoadLog::new);
+        let logs = seen.as_ref().unwrap_or(&contact.logs).iter().map(|log| NormalLoadLog::new(log, rig));
         let Some(logs) = logs.collect::<Option<Vec<NormalLoadLog>>>() else { return };
         if before.is_none() || before == Some(true) || seen.is_some() {
             progress("normal-load actuator");

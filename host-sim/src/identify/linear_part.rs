@@ -258,14 +258,14 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::balance::LogRows;
+    use crate::identify::balance::tests::white_log;
     use crate::identify::noise::tests::white;
     use crate::identify::term::Parameter;
 
     const ROWS: usize = 4000;
 
-    /// A drive whose response is the error of a channel times a factor, and noise.
-    fn drive(error_nm: &[f64], factor: f64) -> (Balance, [DriveLog; 1]) {
+    /// A drive whose response is the error of a channel, and noise.
+    fn drive(error_nm: &[f64]) -> (Balance, [DriveLog; 1]) {
         let still = vec![0.0; ROWS];
         let grid = crate::identify::grid::Grid::new(&(0..ROWS).map(|i| 1e-3 * i as f64).collect::<Vec<_>>());
         let log = DriveLog::made(
@@ -279,23 +279,20 @@ mod tests {
             0.02,
         );
         let noise = white(ROWS, 3);
-        let response =
-            log.filtered(error_nm).iter().zip(&noise).map(|(e, n)| -factor * e + 0.01 * n).collect();
-        let rows = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![0.01]),
-            guessed: Box::new(|_| Vec::new()),
-        };
+        let response = log.filtered(error_nm).iter().zip(&noise).map(|(e, n)| 0.01 * n - e).collect();
         let swing = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
-        let balance = Balance::new(response, vec![(Parameter::amplitude("swing", 1.0), swing)], &[rows], 1.0);
+        let balance = Balance::new(
+            response,
+            vec![(Parameter::amplitude("swing", 1.0), swing)],
+            &[white_log(ROWS, 0.01)],
+            1.0,
+        );
         (balance, [log])
     }
 
     /// What a drive gains by an error that it hears of, and the values of the form.
     fn heard(shown_nm: &[f64], error_nm: &[f64], open_nm: &[&[f64]]) -> (f64, Vec<f64>) {
-        let (balance, logs) = drive(shown_nm, 1.0);
+        let (balance, logs) = drive(shown_nm);
         let open = open_nm.iter().map(|open_nm| vec![open_nm.to_vec()]).collect();
         let heard = [Heard { effect: "channel", error: vec![error_nm.to_vec()], open }];
         let form = &heard_by_drive(&heard, &logs)[0];

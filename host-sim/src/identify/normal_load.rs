@@ -5,6 +5,8 @@
 //! all terms through one Gaussian. The measured normal force is known better than the torque, so the torque is the response.
 //! Rows where the elements are lifted off are left out.
 
+use model_core::sensor::{SecondOrder, SecondOrderState};
+
 use super::balance::{Balance, LogRows};
 use super::bridge_zero;
 use super::contact::log::ContactLog;
@@ -44,6 +46,8 @@ pub struct NormalLoadLog {
     pub angle_rad: Option<Vec<f64>>,
     /// Normal force, N.
     pub normal_n: Vec<f64>,
+    /// Force that the mechanism's mode makes of the torque, N: it rings as the force does, and has the torque's noise.
+    pub carried_n: Vec<f64>,
     /// Both without their noise and with their peaks.
     pub smoothed_torque_nm: Vec<f64>,
     /// As [`Self::smoothed_torque_nm`].
@@ -62,17 +66,19 @@ pub struct NormalLoadLog {
 
 impl NormalLoadLog {
     /// The normal-load actuator of a contact log; `None` where M1's torque is not logged.
-    pub fn new(log: &ContactLog) -> Option<Self> {
+    pub fn new(log: &ContactLog, rig: &RigFile) -> Option<Self> {
         let torque_nm = log.m1_torque_nm.clone()?;
         let torque_noise_nm = noise::standard_deviation(&torque_nm);
         let normal_noise_n = noise::standard_deviation(&log.normal_n);
         // Its noise would make a smaller gain look better where levels do not tell it, and pay for what makes up for that.
         let smoothed_n = smoothed_together([(&log.normal_n, normal_noise_n), (&torque_nm, torque_noise_nm)]);
+        let smoothed_torque_nm = adaptively_smoothed(&torque_nm, torque_noise_nm);
         Some(Self {
             step_s: log.grid.step_s,
             torque_noise_nm,
             normal_noise_n,
-            smoothed_torque_nm: adaptively_smoothed(&torque_nm, torque_noise_nm),
+            carried_n: carried_n(&smoothed_torque_nm, rig, log.grid.step_s),
+            smoothed_torque_nm,
             torque_nm,
             angle_rad: log.m1_angle_rad.clone(),
             filtered_n: gaussian(&smoothed_n, WIDTH, 0),
@@ -97,6 +103,14 @@ impl NormalLoadLog {
     pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
         gaussian(values, WIDTH, 0)
     }
+}
+
+/// The normal force of a torque, N, through the mechanism's mode: nothing where the elements are lifted.
+fn carried_n(torque_nm: &[f64], rig: &RigFile, step_s: f64) -> Vec<f64> {
+    let mode = SecondOrder::new(rig.pressure.mode_hz, rig.pressure.damping_ratio, step_s);
+    let statics = |torque: &f64| (rig.lever_gain_n_per_nm * torque - rig.preload_n).max(0.0);
+    let mut state = SecondOrderState::holding(torque_nm.first().map_or(0.0, statics));
+    torque_nm.iter().map(|torque| mode.step(&mut state, statics(torque)).max(0.0)).collect()
 }
 
 /// Usual sizes over the training logs.
@@ -226,7 +240,7 @@ mod tests {
         let force = |i: usize| rig.lever_gain_n_per_nm * torque(i) - rig.preload_n;
         log.set_signal(Signal::NormalForce, series(&|i| force(i) + 0.25 * noise[1][i]));
         log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
-        let logs = [NormalLoadLog::new(&ContactLog::new(&log, &rig).unwrap()).unwrap()];
+        let logs = [NormalLoadLog::new(&ContactLog::new(&log, &rig).unwrap(), &rig).unwrap()];
         let balance = balance(&logs, &rig, &NormalLoadScales::new(&logs));
         let step = logs[0].filtered(&series(&|i| f64::from(u8::from(high(i)))));
         let apart =

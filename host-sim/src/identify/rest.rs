@@ -402,21 +402,13 @@ pub fn of_balance(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::balance::LogRows;
+    use crate::identify::balance::tests::white_log;
 
     const ROWS: usize = 2000;
 
     /// A balance without a base whose response is everywhere the same, of efforts of this size.
     fn balance(response: f64, scale: f64) -> Balance {
-        let left_out = vec![false; ROWS];
-        let rows = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out,
-            noise: Box::new(|_| vec![0.01]),
-            guessed: Box::new(|_| Vec::new()),
-        };
-        Balance::new(vec![response; ROWS], Vec::new(), &[rows], scale)
+        Balance::new(vec![response; ROWS], Vec::new(), &[white_log(ROWS, 0.01)], scale)
     }
 
     #[test]

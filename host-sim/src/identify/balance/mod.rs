@@ -400,11 +400,22 @@ impl Balance {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::identify::noise::tests::white;
 
     pub(super) const ROWS: usize = 4000;
+
+    /// A log of rows a millisecond apart with white noise of this deviation.
+    pub(in crate::identify) fn white_log(rows: usize, deviation: f64) -> LogRows<'static> {
+        LogRows {
+            width: 1.0,
+            step_s: 1e-3,
+            left_out: vec![false; rows],
+            noise: Box::new(move |_| vec![deviation]),
+            guessed: Box::new(|_| Vec::new()),
+        }
+    }
 
     /// A balance with one base column, a slow swing, and rows whose named deviation is one.
     pub(super) fn balance(response: Vec<f64>) -> Balance {
@@ -414,15 +425,8 @@ mod tests {
     /// The same with more columns of the base.
     fn beside(response: Vec<f64>, more: Vec<(Parameter, Vec<f64>)>) -> Balance {
         let column = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
-        let log = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![1.0]),
-            guessed: Box::new(|_| Vec::new()),
-        };
         let base = [vec![(Parameter::amplitude("swing", 10.0), column)], more].concat();
-        Balance::new(response, base, &[log], 1.0)
+        Balance::new(response, base, &[white_log(ROWS, 1.0)], 1.0)
     }
 
     #[test]

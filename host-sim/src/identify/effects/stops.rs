@@ -115,7 +115,7 @@ impl Stops<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::balance::LogRows;
+    use crate::identify::balance::tests::white_log;
     use crate::identify::noise::tests::white;
 
     #[test]
@@ -131,14 +131,12 @@ mod tests {
         let noise = white(ROWS, 4);
         let y: Vec<f64> =
             (0..ROWS).map(|i| 2.0 * x[i] + 0.2 * first[i] + 0.1 * second[i] + 0.005 * noise[i]).collect();
-        let log = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![0.005]),
-            guessed: Box::new(|_| Vec::new()),
-        };
-        let balance = Balance::new(y, vec![(Parameter::amplitude("gain", 10.0), x.clone())], &[log], 1.0);
+        let balance = Balance::new(
+            y,
+            vec![(Parameter::amplitude("gain", 10.0), x.clone())],
+            &[white_log(ROWS, 0.005)],
+            1.0,
+        );
         let stops = Stops {
             effect: "lever_hysteresis",
             size: 0.5,

@@ -304,7 +304,7 @@ pub fn travel(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::balance::LogRows;
+    use crate::identify::balance::tests::white_log;
     use crate::identify::noise::tests::white;
 
     #[test]
@@ -331,15 +331,9 @@ mod tests {
                 4.0 * of_base[i] + (7.0 * x + phase(i)).cos() + 0.5 * (12.0 * x).sin() + 0.3 * noise[i]
             })
             .collect();
-        let log = || LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![0.3]),
-            guessed: Box::new(|_| Vec::new()),
-        };
         let base = vec![(Parameter::amplitude("base", 10.0), of_base)];
-        let balance = Balance::new(residual.clone(), base, &[log(), log()], 1.0);
+        let balance =
+            Balance::new(residual.clone(), base, &[white_log(ROWS, 0.3), white_log(ROWS, 0.3)], 1.0);
         let candidates = Candidates { wave_numbers: (1..30).map(f64::from).collect(), parts: 1 };
         let alone = Company { forms: &[], residual: &residual };
         let found = |own| joint(&balance, &position, alone, &candidates, 2, own);
@@ -389,15 +383,8 @@ mod tests {
         let truth = 21.0 * 1.37 + 0.55;
         let residual: Vec<f64> =
             position.iter().zip(&noise).map(|(x, n)| (truth * x).sin() + 0.01 * n).collect();
-        let log = LogRows {
-            width: 1.0,
-            step_s: 1e-3,
-            left_out: vec![false; ROWS],
-            noise: Box::new(|_| vec![0.01]),
-            guessed: Box::new(|_| Vec::new()),
-        };
         let base = vec![(Parameter::amplitude("base", 10.0), vec![1.0; ROWS])];
-        let balance = Balance::new(residual.clone(), base, &[log], 1.0);
+        let balance = Balance::new(residual.clone(), base, &[white_log(ROWS, 0.01)], 1.0);
         let company = Company { forms: &[], residual: &residual };
         let found = |parts: usize| {
             let wave_numbers = (2..60).map(|i| 1.37 * f64::from(i)).collect();
