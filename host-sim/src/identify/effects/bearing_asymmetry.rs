@@ -1,7 +1,7 @@
 //! `bearing_asymmetry`: the bearing's friction differs per direction.
 //!
-//! Half the difference is even in speed: Coulomb and viscous friction, and a Stribeck curve in one direction where there is
-//! one. A curve in each would hold the same one in both, which is `bearing_stribeck`: two different ones are that and this.
+//! Half the difference is even in speed: Coulomb friction, viscous friction beside it, and a Stribeck curve in one direction where there
+//! is one. That of Coulomb friction alone is an offset of the torque (`torque_offset`) wherever the bearing turns. A curve in each would hold the same one in both, which is `bearing_stribeck`: two different ones are that and this.
 
 use super::stribeck_curve::{Curve, turns_both_ways};
 use super::{About, DriveLaw, DriveView, Effect};
@@ -40,9 +40,14 @@ impl Effect for BearingAsymmetry {
                 Parameter::amplitude("viscous_half_difference", s.own / s.speed),
             ]
         };
-        let plain = Alternative {
-            log_prior: -2f64.ln(),
-            ..Alternative::columns(self.id(), parameters(), vec![coulomb.clone(), viscous.clone()])
+        let plain = |count: usize| Alternative {
+            form: ["of Coulomb friction", ""][count - 1].into(),
+            log_prior: -4f64.ln(),
+            ..Alternative::columns(
+                self.id(),
+                parameters().into_iter().take(count).collect(),
+                [&coulomb, &viscous].into_iter().take(count).cloned().collect(),
+            )
         };
         let curve = Curve::new(view);
         let acts: [fn(f64) -> f64; 2] = [|d| d.max(0.0), |d| d.min(0.0)];
@@ -56,7 +61,7 @@ impl Effect for BearingAsymmetry {
                 [coulomb.clone(), viscous.clone()].into_iter().chain(curve.columns(view, acts)).collect(),
             )
         };
-        let mut forms = vec![plain];
+        let mut forms = vec![plain(1), plain(2)];
         forms.extend(WAYS.into_iter().zip(acts).map(one_way));
         forms
     }
@@ -78,6 +83,7 @@ impl Effect for BearingAsymmetry {
 #[cfg(test)]
 mod tests {
     use super::super::bearing_stribeck::BearingStribeck;
+    use super::super::torque_offset::TorqueOffset;
     use super::*;
     use crate::identify::balance::Company;
     use crate::identify::drive::{self, DriveLog, DrivePrior, DriveScales};
@@ -85,7 +91,7 @@ mod tests {
     use crate::identify::noise::tests::white;
 
     /// Log evidence that each effect's best form gains where the bearing adds `drag` of the speed.
-    fn gains(drag: impl Fn(f64) -> f64) -> [f64; 2] {
+    fn gains(drag: impl Fn(f64) -> f64) -> [f64; 3] {
         let time: Vec<f64> = (0..20_000).map(|i| 1e-3 * f64::from(i)).collect();
         let position: Vec<f64> = time.iter().map(|t| -8.0 * (0.7 * t).cos() - (3.1 * t).cos()).collect();
         let noise = white(time.len(), 3);
@@ -110,7 +116,7 @@ mod tests {
             fixed: None,
             bearing: None,
         };
-        let effects: [&dyn Effect; 2] = [&BearingStribeck, &BearingAsymmetry];
+        let effects: [&dyn Effect; 3] = [&BearingStribeck, &BearingAsymmetry, &TorqueOffset];
         effects.map(|effect| {
             let evidence = |form: Alternative| balance.solve_forms(&[&form]).log_evidence;
             effect.drive(&view).into_iter().map(evidence).fold(f64::NEG_INFINITY, f64::max) - none.log_evidence
@@ -120,12 +126,21 @@ mod tests {
     #[test]
     fn what_falls_alike_both_ways_is_no_asymmetry_and_what_falls_one_way_is() {
         // Over 2.5 rad/s where 4.5 rad/s are usual.
-        let [falls, uneven] = gains(|v| 0.3 * v.signum() / (1.0 + (v / 2.5).powi(2)));
+        let [falls, uneven, _] = gains(|v| 0.3 * v.signum() / (1.0 + (v / 2.5).powi(2)));
         assert!(falls > uneven + 20.0, "{falls} {uneven}");
         for way in [1.0, -1.0] {
-            let [falls, uneven] =
+            let [falls, uneven, _] =
                 gains(|v| if way * v > 0.0 { 0.3 * v.signum() * (-v.abs() / 2.0).exp() } else { 0.0 });
             assert!(uneven > falls + 20.0, "{falls} {uneven}");
         }
+    }
+
+    #[test]
+    fn coulomb_friction_that_differs_is_as_likely_as_an_offset_where_the_bearing_turns() {
+        let [_, uneven, offset] = gains(|_| 0.1);
+        assert!(offset > 50.0 && (uneven - offset).abs() < 0.5, "{uneven} {offset}");
+        // Viscous friction that differs is no offset.
+        let [_, uneven, offset] = gains(|v| 0.02 * v.abs());
+        assert!(uneven > offset + 10.0, "{uneven} {offset}");
     }
 }
