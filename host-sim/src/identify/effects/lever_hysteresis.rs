@@ -97,8 +97,8 @@ mod tests {
         let (mut torque, mut force, mut rate, mut joints) = (2.0, 50.0, 0.0, 0.0f64);
         let level = |i: usize| 1.0 + 0.5 * ((i / 300 * 7) % 9) as f64 * 0.5;
         let (mut torques, mut forces) = (Vec::new(), Vec::new());
-        let noise = [white(COUNT, 1), white(COUNT, 2)];
-        for i in 0..COUNT {
+        let noise = white(COUNT, 1).into_iter().zip(white(COUNT, 2));
+        for (i, (of_torque, of_force)) in noise.enumerate() {
             for _ in 0..STEPS_PER_SAMPLE {
                 torque += h / rig.m1.torque_lag_s * (level(i) - torque);
                 let moved = rate * h;
@@ -108,8 +108,8 @@ mod tests {
                 rate += h * omega * (omega * (carries - force) - 2.0 * rig.pressure.damping_ratio * rate);
                 force += h * rate;
             }
-            torques.push(torque + 0.002 * noise[0][i]);
-            forces.push(force + 0.5 * noise[1][i]);
+            torques.push(torque + 0.002 * of_torque);
+            forces.push(force + 0.5 * of_force);
         }
         let mut log = Log::default();
         log.set_signal(Signal::Time, (0..COUNT).map(|i| 1e-3 * i as f64).collect());
