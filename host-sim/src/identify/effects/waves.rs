@@ -66,8 +66,8 @@ pub fn joint(
     own_phase: bool,
 ) -> Vec<f64> {
     let used = &balance.used;
-    let scaled = |values: &[f64]| balance.whitening.of(values);
-    let y = scaled(company.residual);
+    let step = candidates.step();
+    let y = balance.whitening.of(company.residual);
     let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
     // The rows over which a wave has one phase.
     let starts = if own_phase { balance.starts.as_slice() } else { &[0] };
@@ -80,7 +80,8 @@ pub fn joint(
         for i in used {
             (columns[1][*i], columns[0][*i]) = (k * position[*i]).sin_cos();
         }
-        columns.each_ref().map(|column| scaled(column))
+        let mut white = balance.whitening.of_columns(&columns.each_ref()).into_iter();
+        std::array::from_fn(|_| white.next().unwrap_or_default())
     };
     // Columns may be nearly the same where the position dwells.
     let ridged = |mut h: DMatrix<f64>| {
@@ -91,7 +92,7 @@ pub fn joint(
     };
     let known = balance.base.iter().map(|(_, column)| column);
     let known = known.chain(company.forms.iter().flat_map(|form| &form.columns));
-    let mut columns: Vec<Vec<f64>> = known.map(|column| scaled(column)).collect();
+    let mut columns = balance.whitening.of_columns(&known.collect::<Vec<_>>());
     let mut found = Vec::new();
     for _ in 0..most {
         // What a wave explains beside these columns, by Schur's complement: those are factored once for all waves.
@@ -122,8 +123,10 @@ pub fn joint(
             let right = right - across.transpose() * &solved;
             right.dot(&linear::factor(&left).solve(&right))
         };
-        let best = |candidates: &[f64]| {
-            let free = candidates.par_iter().filter(|k| !found.contains(*k)).map(|k| (explained(k), *k));
+        let best = |wave_numbers: &[f64]| {
+            // Two waves nearer than that are one over the travel.
+            let apart = |k: &f64| found.iter().all(|other: &f64| (k - other).abs() > 0.5 * step);
+            let free = wave_numbers.par_iter().copied().filter(apart).map(|k| (explained(&k), k));
             free.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, k)| k)
         };
         let Some(k) = best(&candidates.wave_numbers).and_then(|k| best(&candidates.about(k))) else { break };
@@ -188,9 +191,14 @@ impl Candidates {
         self.wave_numbers.len() * self.parts
     }
 
+    /// Distance of two that are tried.
+    fn step(&self) -> f64 {
+        self.wave_numbers.get(1).map_or(0.0, |next| next - self.wave_numbers[0])
+    }
+
     /// Those that are nearer to this one than to others which are tried.
     fn about(&self, k: f64) -> Vec<f64> {
-        let step = self.wave_numbers.get(1).map_or(0.0, |next| next - self.wave_numbers[0]);
+        let step = self.step();
         let half = (self.parts / 2) as i32;
         (-half..=half).map(|part| k + f64::from(part) * step / self.parts as f64).collect()
     }
@@ -388,9 +396,12 @@ mod tests {
         let company = Company { forms: &[], residual: &residual };
         let found = |parts: usize| {
             let wave_numbers = (2..60).map(|i| 1.37 * f64::from(i)).collect();
-            joint(&balance, &position, company, &Candidates { wave_numbers, parts }, 1, false)[0]
+            joint(&balance, &position, company, &Candidates { wave_numbers, parts }, 2, false)
         };
-        assert!((found(1) - truth).abs() > 0.5, "{}", found(1));
-        assert!((found(8) - truth).abs() < 0.5 * 1.37 / 8.0, "{}", found(8));
+        let (coarse, fine) = (found(1), found(8));
+        assert!((coarse[0] - truth).abs() > 0.5, "{coarse:?}");
+        assert!((fine[0] - truth).abs() < 0.5 * 1.37 / 8.0, "{fine:?}");
+        // What is left of it is no second wave beside it.
+        assert!((fine[1] - fine[0]).abs() > 0.5 * 1.37, "{fine:?}");
     }
 }
