@@ -5,8 +5,6 @@
 //! all terms through one Gaussian. The measured normal force is known better than the torque, so the torque is the response.
 //! Rows where the elements are lifted off are left out.
 
-use model_core::sensor::{SecondOrder, SecondOrderState};
-
 use super::balance::{Balance, LogRows};
 use super::bridge_zero;
 use super::contact::log::ContactLog;
@@ -18,6 +16,7 @@ use super::filters::{
 use super::noise;
 use super::term::Parameter;
 use crate::files::rig_file::RigFile;
+use crate::predict::Mechanism;
 
 /// Width of the filter, samples.
 pub const WIDTH: f64 = 4.0;
@@ -46,12 +45,12 @@ pub struct NormalLoadLog {
     pub angle_rad: Option<Vec<f64>>,
     /// Normal force, N.
     pub normal_n: Vec<f64>,
-    /// Force that the mechanism's mode makes of the torque, N: it rings as the force does, and has the torque's noise.
-    pub carried_n: Vec<f64>,
     /// Both without their noise and with their peaks.
     pub smoothed_torque_nm: Vec<f64>,
     /// As [`Self::smoothed_torque_nm`].
     pub smoothed_n: Vec<f64>,
+    /// Force that the mechanism's mode makes of the torque, N: it rings as the force does, and has the torque's noise.
+    pub carried_n: Vec<f64>,
     /// Normal force without its noise, through the filter.
     pub filtered_n: Vec<f64>,
     /// Time since the log's start, s.
@@ -73,11 +72,13 @@ impl NormalLoadLog {
         // Its noise would make a smaller gain look better where levels do not tell it, and pay for what makes up for that.
         let smoothed_n = smoothed_together([(&log.normal_n, normal_noise_n), (&torque_nm, torque_noise_nm)]);
         let smoothed_torque_nm = adaptively_smoothed(&torque_nm, torque_noise_nm);
+        let mut mechanism = Mechanism::settled(rig, smoothed_torque_nm.first().copied().unwrap_or(0.0));
+        let carried_n = smoothed_torque_nm.iter().map(|nm| mechanism.step(log.grid.step_s, *nm)).collect();
         Some(Self {
             step_s: log.grid.step_s,
             torque_noise_nm,
             normal_noise_n,
-            carried_n: carried_n(&smoothed_torque_nm, rig, log.grid.step_s),
+            carried_n,
             smoothed_torque_nm,
             torque_nm,
             angle_rad: log.m1_angle_rad.clone(),
@@ -103,14 +104,6 @@ impl NormalLoadLog {
     pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
         gaussian(values, WIDTH, 0)
     }
-}
-
-/// The normal force of a torque, N, through the mechanism's mode: nothing where the elements are lifted.
-fn carried_n(torque_nm: &[f64], rig: &RigFile, step_s: f64) -> Vec<f64> {
-    let mode = SecondOrder::new(rig.pressure.mode_hz, rig.pressure.damping_ratio, step_s);
-    let statics = |torque: &f64| (rig.lever_gain_n_per_nm * torque - rig.preload_n).max(0.0);
-    let mut state = SecondOrderState::holding(torque_nm.first().map_or(0.0, statics));
-    torque_nm.iter().map(|torque| mode.step(&mut state, statics(torque)).max(0.0)).collect()
 }
 
 /// Usual sizes over the training logs.

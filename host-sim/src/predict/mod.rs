@@ -26,7 +26,7 @@ pub use friction::{
 };
 pub use inputs::ContactInputs;
 pub(crate) use inputs::integral;
-pub use normal_force::predict_normal_force;
+pub use normal_force::{Mechanism, predict_normal_force};
 
 /// A signal as measured and as predicted, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
