@@ -307,12 +307,20 @@ mod tests {
                 candidate(0, 0.0, &[]),
                 candidate(1, 100.0, &[("small", 0.3)]),
                 candidate(2, 101.0, &pair),
+                // Nor is it one beside a trace of a third one, and what that set has is no other's.
+                candidate(3, 101.0, &[("small", 0.3), ("trace", 0.1)]),
             ];
             let (all, too_small) = table(&[(Part::Friction, candidates)]);
-            (all[0].effects.clone(), too_small.iter().map(|small| small.effect).collect::<Vec<_>>())
+            let too_small: Vec<&str> = too_small.iter().map(|small| small.effect).collect();
+            (all[0].effects.clone(), all[0].probability, too_small)
         };
-        assert_eq!(found(1.0), (vec!["large", "small"], vec![]));
-        assert_eq!(found(0.3), (vec![], vec!["small"]));
+        let (effects, probability, too_small) = found(1.0);
+        assert_eq!((effects, too_small), (vec!["large", "small"], vec![]));
+        // Both sets have the same evidence: each counts as far as it is real, 2.5 and 0.83 times what a form may be.
+        let expected = real(2.5) / (real(2.5) + real(0.01 / (3.0 * MODEL_FORM)));
+        assert!((probability - expected).abs() < 1e-9 && expected > 0.8, "{probability} for {expected}");
+        let (effects, _, too_small) = found(0.3);
+        assert_eq!((effects, too_small), (vec![], vec!["small"]));
     }
 
     #[test]

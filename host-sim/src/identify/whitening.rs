@@ -127,9 +127,9 @@ impl Whitening {
                 // F P Fᵀ, columns and then rows, and what is new in each state so that its variance stays.
                 for _ in 0..2 {
                     for j in 0..STATES {
-                        let mut column: State = variance.column(j).into_owned();
-                        row.moves(&mut column.data.0[0]);
-                        variance.set_column(j, &column);
+                        let mut column: [f64; STATES] = variance.column(j).into_owned().into();
+                        row.moves(&mut column);
+                        variance.set_column(j, &column.into());
                     }
                     variance = variance.transpose();
                 }
@@ -137,10 +137,10 @@ impl Whitening {
                     let kept = if j < SLOW { row.kept[j] } else { kept_for(PHASE_KEPT_S) };
                     variance[(j, j)] += stationary[j] * (1.0 - kept * kept);
                 }
-                let seen = State::from_fn(|j, _| row.shown(&variance.column(j).into_owned().data.0[0]));
-                let of_innovation = row.white.powi(2) + row.shown(&seen.data.0[0]);
+                let seen = State::from_fn(|j, _| row.shown(&variance.column(j).into_owned().into()));
+                let of_innovation = row.white.powi(2) + row.shown(&seen.into());
                 let gain = seen / of_innovation;
-                row.gain = gain.data.0[0];
+                row.gain = gain.into();
                 row.deviation = of_innovation.sqrt();
                 variance -= gain * seen.transpose();
                 rows.push(row);

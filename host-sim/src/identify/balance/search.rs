@@ -109,8 +109,7 @@ fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize)
         }
         found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         if round == 0 {
-            let best = found[0].clone();
-            balance.refit_noise(&best);
+            balance.refit_noise(&found[0]);
         }
         all = found;
     }
