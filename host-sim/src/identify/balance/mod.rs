@@ -17,6 +17,7 @@ pub use self::search::{Company, Propose, search};
 use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
 use super::filters::{self, deviation_by_median, local_maximum, median_magnitude};
+use super::mains::Line;
 use super::noise;
 use super::slow_noise;
 use super::term::Parameter;
@@ -135,6 +136,8 @@ pub struct Balance {
     pub row_step_s: f64,
     /// Where each log's rows begin.
     pub starts: Vec<usize>,
+    /// What each log's response picks up from the mains.
+    lines: Vec<Option<Line>>,
 }
 
 /// What a log gives to a balance.
@@ -145,6 +148,8 @@ pub struct LogRows<'l> {
     pub step_s: f64,
     /// Points at which the balance says nothing.
     pub left_out: Vec<bool>,
+    /// What its response picks up from the mains.
+    pub line: Option<Line>,
     /// Deviations at a point from each source that is known.
     pub noise: Box<dyn Fn(usize) -> Vec<f64> + 'l>,
     /// The same from each source that is guessed: how large it is the residuals tell.
@@ -255,19 +260,28 @@ impl Balance {
             rests: true,
             row_step_s,
             starts,
+            lines: logs.iter().map(|log| log.line).collect(),
         };
         balance.whiten(0.0);
         balance
     }
 
+    /// Distance of two points, s.
+    fn point_step_s(&self) -> f64 {
+        let logs = self.rows_of_logs();
+        let between = |rows: &Vec<usize>| rows.windows(2).map(|pair| pair[1] - pair[0]).min();
+        self.row_step_s / logs.iter().filter_map(between).min().unwrap_or(1) as f64
+    }
+
     /// Takes the rows' deviations, and slow processes of this variance beside them.
     fn whiten(&mut self, of_each: f64) {
         let logs = self.rows_of_logs();
-        let between = |rows: &Vec<usize>| rows.windows(2).map(|pair| pair[1] - pair[0]).min();
-        let row = logs.iter().filter_map(between).min().unwrap_or(1);
-        let step_s = self.row_step_s / row as f64;
-        let logs: Vec<LogPoints> =
-            logs.into_iter().map(|points| LogPoints { points, step_s, line: None }).collect();
+        let step_s = self.point_step_s();
+        let logs: Vec<LogPoints> = logs
+            .into_iter()
+            .zip(&self.lines)
+            .map(|(points, line)| LogPoints { points, step_s, line: *line })
+            .collect();
         self.whitening = Whitening::new(&logs, &self.deviation, |_| true, of_each);
         self.white_response = self.whitening.of(&self.response);
         let base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
@@ -350,12 +364,25 @@ impl Balance {
         let logs = self.rows_of_logs();
         let of_rows = |of: &[f64]| -> Vec<f64> { logs.iter().flatten().map(|i| of[*i]).collect() };
         let lengths: Vec<usize> = logs.iter().map(Vec::len).collect();
-        let [residual, deviation] = [&solved.residual, &self.deviation].map(|of| of_rows(of));
+        let without_lines = self.without_lines(&solved.residual);
+        let [residual, deviation] = [&without_lines, &self.deviation].map(|of| of_rows(of));
         let errors = slow_noise::Errors { residual: &residual, deviation: &deviation, lengths: &lengths };
         let of_each = errors.likeliest_of_decade();
         self.whiten(of_each);
         self.refit_sources(solved);
         self.refit_level(solved, of_each);
+    }
+
+    /// A residual's used rows without what swings with the mains of each log.
+    fn without_lines(&self, residual: &[f64]) -> Vec<f64> {
+        let mut left = vec![0.0; residual.len()];
+        self.used.iter().for_each(|i| left[*i] = residual[*i]);
+        for (points, line) in self.points_of_logs().zip(&self.lines) {
+            if let Some(line) = line {
+                line.take_off(&mut left[points], self.point_step_s());
+            }
+        }
+        left
     }
 
     /// Takes the size of each guessed source from what a solved set leaves new in each row.
@@ -412,6 +439,7 @@ pub(super) mod tests {
             width: 1.0,
             step_s: 1e-3,
             left_out: vec![false; rows],
+            line: None,
             noise: Box::new(move |_| vec![deviation]),
             guessed: Box::new(|_| Vec::new()),
         }
