@@ -184,6 +184,12 @@ impl Noise {
         })
     }
 
+    /// Leaves out what the model of another hypothesis leaves out too.
+    pub fn leave_out(&mut self, other: &Self) {
+        self.known.iter_mut().zip(&other.known).for_each(|(known, other)| *known &= other);
+        self.unresolved_s.0 = self.unresolved_s.0.max(other.unresolved_s.0);
+    }
+
     /// Deviation of a sample from its named sources before anything is fitted, the form of the model left out: what noise
     /// alone leaves.
     pub fn named(&self, sample: usize) -> f64 {
@@ -393,6 +399,19 @@ pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_either_model_does_not_resolve_is_left_out_and_told() {
+        let of = |known: [bool; 4], out_s: f64| Noise {
+            known: known.to_vec(),
+            unresolved_s: (out_s, 4.0),
+            ..Noise::default()
+        };
+        let mut noise = of([true, false, true, true], 1.0);
+        noise.leave_out(&of([true, true, false, false], 2.0));
+        assert_eq!(noise.known, [true, false, false, false]);
+        assert!(noise.unresolved().unwrap().starts_with("2.0 s of 4.0 s"));
+    }
 
     #[test]
     fn slip_and_stick_that_change_within_few_samples_are_not_resolved() {

@@ -119,7 +119,11 @@ pub struct Found {
 
 /// Searches for causes in other forms than these.
 pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&str) + Sync)) -> Found {
-    let base = baseline(problem);
+    let as_in_file = baseline(problem);
+    // What the file's numbers take for sliding may be slip and stick by those found.
+    let found = problem.noise_at(&[], &as_in_file.p);
+    problem.noise.leave_out(&found);
+    let base = problem.fit(&[], as_in_file.p, SUBSET_ITERATIONS, None);
     progress("single causes");
     let (singles, known) = singles(problem, denied, &base);
     let mut all: Vec<Fit> = singles.iter().take(FINALISTS).cloned().collect();
