@@ -10,7 +10,7 @@ use super::holdout::{Errors, LogErrors};
 use super::judge::Judgement;
 use super::linear_part::Linear;
 use super::rest::NAMED_WITHIN;
-use super::table::{Hypothesis, Part};
+use super::table::{Hypothesis, Part, TooSmall};
 use crate::files::effect_id::subsystem_of;
 
 /// Hypotheses written out; the others are summed up.
@@ -372,6 +372,19 @@ fn against(best: &Hypothesis, rival: &Hypothesis) -> String {
     }
 }
 
+/// Why a cause that changes so little is not named.
+fn too_small(small: &TooSmall) -> String {
+    if small.size < f64::EPSILON {
+        return "it would not change the prediction".into();
+    }
+    format!(
+        "it would change the prediction by {} of the signal, less than the {} that the form of the model and the law of \
+         a larger cause leave open",
+        percent(small.size),
+        percent(small.floor)
+    )
+}
+
 fn rejected(judged: &Judgement, verdict: &str, marginal: &dyn Fn(&str) -> f64) -> Vec<Rejected> {
     let best = judged.best();
     let named = |id: &str| verdict == "named" && best.effects.contains(&id);
@@ -380,12 +393,7 @@ fn rejected(judged: &Judgement, verdict: &str, marginal: &dyn Fn(&str) -> f64) -
         let with = judged.hypotheses.iter().find(|h| h.effects.contains(&effect));
         let small = judged.too_small.iter().find(|small| small.effect == effect);
         let why = match (with, small) {
-            (_, Some(small)) => format!(
-                "it would change the prediction by {} of the signal, less than the {} that the form of the model and the law of \
-                 a larger cause leave open",
-                percent(small.size),
-                percent(small.floor)
-            ),
+            (_, Some(small)) => too_small(small),
             (Some(h), None) if h.effects == best.effects => {
                 "what is left is larger than what it explains".into()
             }
@@ -498,5 +506,12 @@ mod tests {
         assert_eq!(moves(0.052, 0.0031), "falls from 5.20 % to 0.31 %");
         assert_eq!(moves(0.0102, 0.0139), "rises from 1.02 % to 1.39 %");
         assert_eq!(moves(0.01021, 0.01019), "stays at 1.02 %");
+    }
+
+    #[test]
+    fn a_cause_that_changes_nothing_is_not_said_to_change_less_than_nothing() {
+        let why = |size, floor| too_small(&TooSmall { effect: "wear_drift", size, floor });
+        assert_eq!(why(0.0, 0.0), "it would not change the prediction");
+        assert!(why(0.001, 0.004).contains("0.10 % of the signal, less than the 0.40 %"));
     }
 }
