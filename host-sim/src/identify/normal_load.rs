@@ -209,7 +209,7 @@ fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> Log
         width: WIDTH,
         step_s: log.step_s,
         left_out,
-        // Smoothing has taken it out of the force.
+        // Smoothing takes it out of the force where the torque is steady.
         line: None,
         noise: Box::new(noise),
         guessed: Box::new(guessed),

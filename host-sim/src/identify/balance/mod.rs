@@ -136,8 +136,8 @@ pub struct Balance {
     pub row_step_s: f64,
     /// Where each log's rows begin.
     pub starts: Vec<usize>,
-    /// What each log's response picks up from the mains.
-    lines: Vec<Option<Line>>,
+    /// Distance of two points of each log, s, and what its response picks up from the mains.
+    sampled: Vec<(f64, Option<Line>)>,
 }
 
 /// What a log gives to a balance.
@@ -260,28 +260,17 @@ impl Balance {
             rests: true,
             row_step_s,
             starts,
-            lines: logs.iter().map(|log| log.line).collect(),
+            sampled: logs.iter().map(|log| (log.step_s, log.line)).collect(),
         };
         balance.whiten(0.0);
         balance
     }
 
-    /// Distance of two points, s.
-    fn point_step_s(&self) -> f64 {
-        let logs = self.rows_of_logs();
-        let between = |rows: &Vec<usize>| rows.windows(2).map(|pair| pair[1] - pair[0]).min();
-        self.row_step_s / logs.iter().filter_map(between).min().unwrap_or(1) as f64
-    }
-
     /// Takes the rows' deviations, and slow processes of this variance beside them.
     fn whiten(&mut self, of_each: f64) {
-        let logs = self.rows_of_logs();
-        let step_s = self.point_step_s();
-        let logs: Vec<LogPoints> = logs
-            .into_iter()
-            .zip(&self.lines)
-            .map(|(points, line)| LogPoints { points, step_s, line: *line })
-            .collect();
+        let logs = self.rows_of_logs().into_iter().zip(&self.sampled);
+        let logs: Vec<LogPoints> =
+            logs.map(|(points, &(step_s, line))| LogPoints { points, step_s, line }).collect();
         self.whitening = Whitening::new(&logs, &self.deviation, |_| true, of_each);
         self.white_response = self.whitening.of(&self.response);
         let base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
@@ -377,9 +366,9 @@ impl Balance {
     fn without_lines(&self, residual: &[f64]) -> Vec<f64> {
         let mut left = vec![0.0; residual.len()];
         self.used.iter().for_each(|i| left[*i] = residual[*i]);
-        for (points, line) in self.points_of_logs().zip(&self.lines) {
+        for (points, (step_s, line)) in self.points_of_logs().zip(&self.sampled) {
             if let Some(line) = line {
-                line.take_off(&mut left[points], self.point_step_s());
+                line.take_off(&mut left[points], *step_s);
             }
         }
         left

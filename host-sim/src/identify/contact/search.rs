@@ -120,7 +120,8 @@ pub struct Found {
 /// Searches for causes in other forms than these.
 pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&str) + Sync)) -> Found {
     let as_in_file = baseline(problem);
-    // What the file's numbers take for sliding may be slip and stick by those found.
+    // What the file's numbers take for sliding may be slip and stick by those found. Their noise is not taken: a baseline has part of
+    // what it does not explain in its slopes, and would have it in the noise too.
     let found = problem.noise_at(&[], &as_in_file.p);
     problem.noise.leave_out(&found);
     let base = problem.fit(&[], as_in_file.p, SUBSET_ITERATIONS, None);
