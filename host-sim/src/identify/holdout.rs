@@ -6,7 +6,7 @@
 
 use super::balance::{Alternative, Balance, Company, Solved};
 use super::contact::log::ContactLog;
-use super::contact::problem::Problem;
+use super::contact::problem::{Fit, Problem, Role};
 use super::contact_part::{self, ContactPart};
 use super::drive::{self, Bearing, DriveLog, DriveScales};
 use super::effects::{self, DriveView, NormalLoadView};
@@ -14,6 +14,7 @@ use super::heard::Heard;
 use super::judge::Judgement;
 use super::linear_part::{self, Linear};
 use super::normal_load::{self, NormalLoadLog, NormalLoadScales};
+use super::rest;
 use super::table::Part;
 use crate::files::log::Log;
 use crate::files::rig_file::RigFile;
@@ -182,32 +183,51 @@ fn contact_errors(
     let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map_or(fit, |r| &r.fit);
     let mut problem = Problem::new(logs, &contact.baseline, &terms);
     problem.noise = problem.noise_at(&own_terms, &fit.p);
-    let left = |problem: &Problem<'_>, terms: &[usize], p: &[f64]| {
-        let shown = problem.predict(terms, p).shown_nm;
-        let mut left: Vec<f64> = problem.measured().zip(shown).map(|(y, x)| y - x).collect();
-        problem.noise.innovations(&mut left);
-        left
-    };
     let logged = Problem::with_noise(as_logged, &contact.baseline, &terms, problem.noise.clone());
-    let (base, extended) = (left(&logged, &none.terms, &none.p), left(&problem, &own_terms, &fit.p));
+    let base = contact_left(&logged, &none.terms, &none.p);
+    let extended = contact_left(&problem, &own_terms, &fit.p);
+    let noise = contact_noise(contact, fit, &problem, &problem.predict(&own_terms, &fit.p).slides());
     let mut errors = Errors::default();
-    let mut at = 0;
-    // Bristles at rest and the instants at which they break away show no law.
-    let limit = problem.well_known_nm();
+    let measured: Vec<f64> = problem.measured().collect();
+    let mut known = known_samples(&problem).into_iter().peekable();
+    let mut ends = 0;
     for log in logs {
-        let points: Vec<Point> = (0..log.len())
-            .filter(|i| log.usable[*i] && problem.noise.named(at + *i) < limit)
-            .map(|i| Point {
-                signal: log.friction_nm[i],
-                base: base[at + i],
-                extended: extended[at + i],
-                noise: problem.noise.named(at + i),
-            })
+        ends += log.len();
+        let own = std::iter::from_fn(|| known.next_if(|i| *i < ends));
+        let points: Vec<Point> = own
+            .map(|i| Point { signal: measured[i], base: base[i], extended: extended[i], noise: noise[i] })
             .collect();
         errors.add(&log.source, &points, log.grid.step_s);
-        at += log.len();
     }
     errors
+}
+
+/// What a contact leaves, N m, but for what it was seen to swing with.
+fn contact_left(problem: &Problem<'_>, terms: &[usize], p: &[f64]) -> Vec<f64> {
+    let shown = problem.predict(terms, p).shown_nm;
+    let mut left: Vec<f64> = problem.measured().zip(shown).map(|(y, x)| y - x).collect();
+    problem.noise.innovations(&mut left);
+    left
+}
+
+/// Samples at which errors are taken: bristles at rest and the instants at which they break away show no law.
+fn known_samples(problem: &Problem<'_>) -> Vec<usize> {
+    let limit = problem.well_known_nm();
+    let usable = problem.logs.iter().flat_map(|log| log.usable.iter().copied()).enumerate();
+    usable.filter(|(i, usable)| *usable && problem.noise.named(*i) < limit).map(|(i, _)| i).collect()
+}
+
+/// Deviation of each sample that noise alone leaves: that of the sensors, as many times as a fit to the training logs leaves there
+/// within what is known of it.
+fn contact_noise(contact: &ContactPart, fit: &Fit, problem: &Problem<'_>, slides: &[bool]) -> Vec<f64> {
+    let zero_nm = contact.baseline.deviation_of(Role::FrictionZero);
+    let mut there = contact.problem();
+    there.noise = there.noise_at(&fit.terms, &fit.p);
+    let named = there.noise.of_sensors(there.logs, &contact.noise, &there.slides(fit), zero_nm);
+    let left = contact_left(&there, &fit.terms, &fit.p);
+    let times = rest::over_named(&named, &left, &known_samples(&there));
+    let of_sensors = problem.noise.of_sensors(problem.logs, &contact.noise, slides, zero_nm);
+    of_sensors.into_iter().map(|deviation| times * deviation).collect()
 }
 
 /// Values of a training set's columns in another balance; those of one log alone are left out.
@@ -268,8 +288,9 @@ fn linear_errors(
     balance: &Balance,
     base: &[f64],
     extended: &[f64],
-    noise_over_named: f64,
+    (fitted, solved): (&Balance, &Solved),
 ) -> Errors {
+    let noise = balance.noise_alone(fitted, &solved.residual);
     let mut errors = Errors::default();
     for (rows, name) in balance.rows_of_logs().iter().zip(names) {
         let points: Vec<Point> = rows
@@ -278,7 +299,7 @@ fn linear_errors(
                 signal: balance.response[i],
                 base: base[i],
                 extended: extended[i],
-                noise: noise_over_named * balance.first_deviation[i],
+                noise: noise[i],
             })
             .collect();
         errors.add(name, &points, balance.row_step_s);
@@ -303,12 +324,12 @@ fn drive_errors(
             &part.balance,
             &none.residual,
             &part.solved[place].residual,
-            part.noise_over_named(place),
+            (&part.balance, &part.solved[place]),
         );
     }
     let (balance, fixed) = drive_alternatives(found, part, logs, rig, told);
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(&names, &balance, &base, &extended, part.noise_over_named(place))
+    linear_errors(&names, &balance, &base, &extended, (&part.balance, &part.solved[place]))
 }
 
 /// The balance of held-out logs, and the forms of the drive's causes there with the training logs' shapes; `told` is what the
@@ -383,7 +404,7 @@ fn normal_load_errors(
             &part.balance,
             &none.residual,
             &part.solved[place].residual,
-            part.noise_over_named(place),
+            (&part.balance, &part.solved[place]),
         );
     }
     let own_scales = NormalLoadScales::new(logs);
@@ -402,5 +423,5 @@ fn normal_load_errors(
         fixed.extend(effects::with_id(own.effect).into_iter().flat_map(|e| e.normal_load(&view)));
     }
     let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(names, &balance, &base, &extended, part.noise_over_named(place))
+    linear_errors(names, &balance, &base, &extended, (&part.balance, &part.solved[place]))
 }

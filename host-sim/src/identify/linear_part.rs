@@ -140,13 +140,6 @@ impl Linear {
         self.balance.difference(&a, &b) / self.balance.scale.max(1e-12)
     }
 
-    /// How many times the named noise noise alone leaves: no more than a set leaves of the training logs, nor than their quiet
-    /// stretches show.
-    pub fn noise_over_named(&self, place: usize) -> f64 {
-        let left = self.balance.over_named_noise(&self.solved[place].residual);
-        left.min(self.balance.quiet_over_named_noise())
-    }
-
     /// What a set leaves.
     pub fn rest(&self, place: usize) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());

@@ -21,7 +21,7 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
     let smallest =
         values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::MAX, f64::min);
     let resolution = if smallest < f64::MAX { smallest / 12f64.sqrt() } else { 0.0 };
-    quiet_deviation(values, WINDOW, (WINDOW - 3) as f64).max(resolution)
+    quiet_deviation(values).max(resolution)
 }
 
 /// As [`standard_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
@@ -49,21 +49,15 @@ pub fn difference_deviation(values: &[f64]) -> f64 {
     variances.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt().min(standard_deviation(values))
 }
 
-/// Standard deviation of the noise of a channel behind a filter, of whose samples so many count as one, in stretches of so many
-/// samples: with what is slower than the filter and quicker than a stretch, as 1/f noise has it.
-pub fn filtered_deviation(values: &[f64], alike: f64, stretch: usize) -> f64 {
-    quiet_deviation(values, stretch, ((stretch - 3) as f64 / alike).max(1.0))
-}
-
-/// Deviation in the quiet ones of windows of so many samples, which count for so many independent ones.
-fn quiet_deviation(values: &[f64], window: usize, freedom: f64) -> f64 {
-    let mut variances: Vec<f64> = values.chunks_exact(window).map(detrended_variance).collect();
+/// Deviation in the quiet windows.
+fn quiet_deviation(values: &[f64]) -> f64 {
+    let mut variances: Vec<f64> = values.chunks_exact(WINDOW).map(detrended_variance).collect();
     if variances.is_empty() {
         return detrended_variance(values).sqrt();
     }
     let rank = ((variances.len() - 1) as f64 * QUANTILE).round() as usize;
     let (_, quiet, _) = variances.select_nth_unstable_by(rank, f64::total_cmp);
-    (*quiet / chi_square_ratio(DEVIATE, freedom)).sqrt()
+    (*quiet / chi_square_ratio(DEVIATE, (WINDOW - 3) as f64)).sqrt()
 }
 
 /// Quantile of χ²/f at a normal deviate, by Wilson and Hilferty's cube.
@@ -125,7 +119,6 @@ impl White {
 #[cfg(test)]
 pub(in crate::identify) mod tests {
     use super::*;
-    use crate::identify::filters::gaussian;
 
     pub(in crate::identify) fn white(count: usize, seed: u64) -> Vec<f64> {
         let mut noise = White::new(seed);
@@ -172,30 +165,9 @@ pub(in crate::identify) mod tests {
     #[test]
     fn a_channel_without_noise_has_none() {
         let values: Vec<f64> = (0..5000).map(|i| 1e-3 * f64::from(i)).collect();
-        assert!(quiet_deviation(&values, WINDOW, (WINDOW - 3) as f64) < 1e-12);
+        assert!(quiet_deviation(&values) < 1e-12);
         // Counts of an encoder that hardly moves: that of a count.
         let counts: Vec<f64> = (0..5000).map(|i| if i < 2500 { 1.0 } else { 1.5 }).collect();
         assert_eq!(standard_deviation(&counts), 0.5 / 12f64.sqrt());
-    }
-
-    #[test]
-    fn noise_slower_than_a_filter_is_seen_in_stretches_that_rest() {
-        // White noise, and as much of a first-order process of 30 samples, half of the time beside a signal.
-        let (mut noise, kept) = (White::new(11), f64::exp(-1.0 / 30.0));
-        let (mut slow, mut values, mut other) = (0.0, Vec::new(), Vec::new());
-        for i in 0..40_000 {
-            slow = kept * slow + (1.0 - kept * kept).sqrt() * noise.next();
-            let signal = if i / 5000 % 2 == 0 { 40.0 * (0.02 * f64::from(i)).sin() } else { 0.0 };
-            other.push(noise.next());
-            values.push(other[other.len() - 1] + slow + signal);
-        }
-        let alike = 2.0 * std::f64::consts::PI.sqrt() * 4.0;
-        let found = |values: &[f64]| filtered_deviation(&gaussian(values, 4.0, 0), alike, 256);
-        let of_white = (1.0 / alike).sqrt();
-        // A stretch has some four independent samples of what is slow, of which a parabola takes a part: it is seen too small, and
-        // never for nothing.
-        let (white, both) = (found(&other), found(&values));
-        assert!((white / of_white - 1.0).abs() < 0.1, "{white} for {of_white}");
-        assert!((0.6..1.0).contains(&(both / of_white.hypot(1.0))), "{both}");
     }
 }

@@ -27,6 +27,12 @@ const LEAST_SHARE: f64 = 0.05;
 /// Steepness of the steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
 const STEEPNESS: f64 = 8.0;
 
+/// How many times the noise of named sources is what is left in these rows: no less, and no more than they are known within.
+pub fn over_named(named: &[f64], left: &[f64], rows: &[usize]) -> f64 {
+    let squares = |of: &[f64]| rows.iter().map(|&i| of[i] * of[i]).sum::<f64>();
+    (squares(left) / squares(named).max(f64::MIN_POSITIVE)).sqrt().clamp(1.0, NAMED_WITHIN)
+}
+
 /// What is left of a balance.
 #[derive(Debug, Clone, Default)]
 pub struct Rest {

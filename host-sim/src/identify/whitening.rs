@@ -17,7 +17,7 @@ use super::mains::Line;
 /// Time constants of the processes, s: a decade apart, from what the effective sample size counts to a log's length.
 const LONG_S: [f64; SLOW] = [0.05, 0.5, 5.0, 50.0];
 /// Processes.
-const SLOW: usize = 4;
+pub(super) const SLOW: usize = 4;
 /// States: the processes, and the swing with what it is a quarter of a turn later.
 const STATES: usize = SLOW + 2;
 /// For so long a mains line keeps its phase, s: that of a grid whose frequency is within 20 mHz, one deviation.

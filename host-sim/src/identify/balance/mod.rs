@@ -16,13 +16,13 @@ use nalgebra::DMatrix;
 pub use self::search::{Company, Propose, search};
 use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
-use super::filters::{self, deviation_by_median, local_maximum, median_magnitude};
+use super::filters::{self, deviation_by_median, local_maximum};
 use super::mains::Line;
-use super::noise;
+use super::rest;
 use super::slow_noise;
 use super::term::Parameter;
 use super::variance_components::{self, Sample};
-use super::whitening::{LogPoints, Whitening};
+use super::whitening::{LogPoints, SLOW, Whitening};
 
 /// The disc where it does not move as the motor does.
 #[derive(Debug, Clone)]
@@ -115,6 +115,9 @@ pub struct Balance {
     pub first_deviation: Vec<f64>,
     /// Squares of the sources at each point, point after point, and the least factor of each.
     pub(super) sources: (Vec<f64>, Vec<f64>),
+    /// Factors of the sources and variance of each slow process, as refitted.
+    factors: Vec<f64>,
+    slow_of_each: f64,
     /// Rows that take part.
     pub used: Vec<usize>,
     /// Usual size of the torques whose sum the response is: what errors of form are relative to.
@@ -128,8 +131,6 @@ pub struct Balance {
     /// The same of the response and of the base's columns.
     white_response: Vec<f64>,
     white_base: Vec<Vec<f64>>,
-    /// Width of the widest log's filter, samples.
-    pub filter_samples: f64,
     /// Whether the response has quiet stretches; what may ripple all the time has none.
     pub rests: bool,
     /// Distance of the used rows, s.
@@ -161,9 +162,6 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
-/// Stretches in which a balance's response shows its noise, in widths of its filter: eighteen samples that do not count as one
-/// another, a quarter of a second at 1 kHz, for which a plan mostly holds its speed.
-const STRETCH_WIDTHS: f64 = 64.0;
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 
@@ -243,6 +241,8 @@ impl Balance {
         }
         let first_deviation = deviation.clone();
         let mut balance = Self {
+            factors: vec![1.0; least.len()],
+            slow_of_each: 0.0,
             response,
             sensors: base.len(),
             base,
@@ -256,7 +256,6 @@ impl Balance {
             whitening: Whitening::default(),
             white_response: Vec::new(),
             white_base: Vec::new(),
-            filter_samples: logs.iter().map(|log| log.width).fold(1.0, f64::max),
             rests: true,
             row_step_s,
             starts,
@@ -268,6 +267,7 @@ impl Balance {
 
     /// Takes the rows' deviations, and slow processes of this variance beside them.
     fn whiten(&mut self, of_each: f64) {
+        self.slow_of_each = of_each;
         let logs = self.rows_of_logs().into_iter().zip(&self.sampled);
         let logs: Vec<LogPoints> =
             logs.map(|(points, &(step_s, line))| LogPoints { points, step_s, line }).collect();
@@ -311,25 +311,28 @@ impl Balance {
             .collect()
     }
 
-    /// How many times the named noise a residual is, by its median and 1 at least.
-    pub fn over_named_noise(&self, residual: &[f64]) -> f64 {
-        deviation_by_median(self.used.iter().map(|&i| residual[i] / self.first_deviation[i])).max(1.0)
+    /// Deviation at each point that noise alone leaves, as `fitted`, a balance of logs of the same rig, tells of its sources, and
+    /// of what is slow no more than a bridge's class allows: beyond that it is nothing of a sensor's. `residual` is what is left
+    /// there.
+    pub fn noise_alone(&self, fitted: &Self, residual: &[f64]) -> Vec<f64> {
+        let left = rest::over_named(&fitted.of_sensors(fitted), residual, &fitted.used);
+        self.of_sensors(fitted).into_iter().map(|deviation| left * deviation).collect()
     }
 
-    /// How many times the named noise the response's own noise is, with what is slower than the filter, as quiet stretches of each
-    /// log show it, and 1 at least: sources are named by the white noise of their channels. 1 where there are none.
-    pub fn quiet_over_named_noise(&self) -> f64 {
-        if !self.rests {
-            return 1.0;
+    /// The same where the white noise of the channels is as large as it is said to be.
+    fn of_sensors(&self, fitted: &Self) -> Vec<f64> {
+        let slow = (SLOW as f64 * fitted.slow_of_each).min(fitted.bridge_zero.powi(2));
+        let mut out = Vec::with_capacity(self.response.len());
+        for (points, (_, line)) in self.points_of_logs().zip(&self.sampled) {
+            let besides = slow + line.map_or(0.0, |line| line.variance);
+            let sources = self.sources.0.chunks(fitted.factors.len()).skip(points.start).take(points.len());
+            let deviation = |squares: &[f64]| {
+                let of_source = squares.iter().zip(&fitted.factors).map(|(n, a)| n * a.min(1.0));
+                (of_source.sum::<f64>() + besides).sqrt().max(1e-12)
+            };
+            out.extend(sources.map(deviation));
         }
-        // A Gaussian's samples count as one over the sum of its autocorrelation.
-        let alike = 2.0 * std::f64::consts::PI.sqrt() * self.filter_samples;
-        let stretch = (STRETCH_WIDTHS * self.filter_samples).round() as usize;
-        let of_log = |points| noise::filtered_deviation(&self.response[points], alike, stretch);
-        // A log that never rests from swinging shows it as noise; the same channels are quiet in another.
-        let quiet = self.points_of_logs().map(of_log).fold(f64::INFINITY, f64::min);
-        let named = median_magnitude(self.used.iter().map(|&i| self.first_deviation[i]));
-        (quiet / named.max(f64::MIN_POSITIVE)).max(1.0)
+        out
     }
 
     /// RMS over the used rows.
@@ -391,6 +394,7 @@ impl Balance {
             let variance: f64 = squares.iter().zip(&factors).map(|(n, a)| n * a).sum();
             *deviation = variance.sqrt().max(1e-12);
         }
+        self.factors = factors;
     }
 
     /// Takes the level of what is new in each row, and the effective sample size, beside slow processes of this variance.
@@ -410,6 +414,7 @@ impl Balance {
     /// Takes back what [`Self::refit_noise`] has done.
     fn forget_residuals(&mut self) {
         self.deviation.copy_from_slice(&self.first_deviation);
+        self.factors.fill(1.0);
         self.whiten(0.0);
         self.temper = FIRST_TEMPER;
     }
@@ -418,6 +423,7 @@ impl Balance {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::identify::noise::White;
     use crate::identify::noise::tests::white;
 
     pub(super) const ROWS: usize = 4000;
@@ -490,23 +496,42 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn noise_slower_than_the_filter_is_beyond_the_named_one_unless_it_may_be_a_ripple() {
-        // Of three widths of the filter, so that a stretch of 64 has ten of it and a parabola takes three.
-        let kept = f64::exp(-1.0 / 3.0);
-        let slow = white(ROWS, 5).into_iter().scan(0.0, |slow, new| {
-            *slow = kept * *slow + (1.0 - kept * kept).sqrt() * new;
-            Some(*slow)
-        });
-        // As large behind the filter as what is named, one, and twice that.
-        let passed = (2.0 * std::f64::consts::PI.sqrt()).sqrt();
-        let quick = white(ROWS, 6).into_iter().map(|n| passed * n);
-        let both: Vec<f64> = slow.zip(quick.clone()).map(|(slow, quick)| 2.0 * slow + quick).collect();
-        let over = |values: &Vec<f64>| balance(filters::gaussian(values, 1.0, 0));
-        let [white, both] = [&quick.collect(), &both].map(over);
-        assert!(white.quiet_over_named_noise() < 1.1, "{}", white.quiet_over_named_noise());
-        assert!(both.quiet_over_named_noise() > 1.4, "{}", both.quiet_over_named_noise());
-        let alone = both.without_rests();
-        assert_eq!(alone.quiet_over_named_noise(), 1.0);
+    fn noise_of_another_log_is_as_large_as_its_sensors_make_it_and_no_larger() {
+        // White noise, and slow processes as 1/f noise has them, of this deviation each.
+        let noisy = |seed: u64, white_sd: f64, of_each: f64| -> Vec<f64> {
+            let mut noise = White::new(seed);
+            let constants = [50.0, 500.0, 5000.0];
+            let mut slow = constants.map(|_| of_each * noise.next());
+            let mut next = |_| {
+                for (slow, constant) in slow.iter_mut().zip(constants) {
+                    let kept = f64::exp(-1.0 / constant);
+                    *slow = kept * *slow + (1.0 - kept * kept).sqrt() * of_each * noise.next();
+                }
+                white_sd * noise.next() + slow.iter().sum::<f64>()
+            };
+            (0..ROWS).map(&mut next).collect()
+        };
+        // What is said of the noise and what there is, in logs other than those fitted.
+        let said = |white_sd: f64, of_each: f64, zero: f64| {
+            let (mut noise, mut there) = (0.0, 0.0);
+            for seed in 1..=8 {
+                let mut fitted = balance(noisy(seed, white_sd, of_each)).with_sensors(1, zero);
+                let solved = fitted.solve(&[], &[]);
+                fitted.refit_noise(&solved);
+                let other = balance(noisy(100 + seed, white_sd, of_each));
+                noise += other.rms(&other.noise_alone(&fitted, &solved.residual)).powi(2);
+                there += other.rms(&other.response).powi(2);
+            }
+            [noise, there].map(|sum| (sum / 8.0).sqrt())
+        };
+        for [noise, there] in [said(1.0, 0.0, 9.0), said(1.0, 2.0, 9.0)] {
+            assert!((0.8..1.25).contains(&(noise / there)), "{noise} {there}");
+        }
+        // A bridge wanders by no more than its zero is known to, and noise is no larger than it is known within.
+        let bound = rest::NAMED_WITHIN * 1f64.hypot(0.1);
+        for [noise, there] in [said(1.0, 2.0, 0.1), said(3.0, 0.0, 0.1)] {
+            assert!(noise <= bound && there > bound, "{noise} {there}");
+        }
     }
 
     #[test]

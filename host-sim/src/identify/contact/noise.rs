@@ -25,7 +25,7 @@ use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
 use crate::identify::slow_noise::Errors;
 use crate::identify::variance_components::{self, Sample};
-use crate::identify::whitening::{LogPoints, Whitening};
+use crate::identify::whitening::{LogPoints, SLOW, Whitening};
 
 /// What no model of friction is more accurate than, relative.
 pub(crate) const MODEL_FORM: f64 = 0.004;
@@ -84,6 +84,8 @@ pub struct Noise {
     swinging: Vec<bool>,
     /// Factors a of the sources, as fitted.
     factors: [f64; SOURCES],
+    /// Variance of slow noise, as fitted.
+    slow: f64,
     /// What is new in each sample beside slow noise and the mains' line; no rows before anything is fitted.
     whitening: Whitening,
 }
@@ -196,6 +198,19 @@ impl Noise {
         self.named[sample]
     }
 
+    /// Deviation of each sample from what is named, the mains' line and the slow noise of `fitted`, the noise in logs of the same
+    /// rig. That shows where the tip slides, and is no more than a bridge's zero of this deviation: beyond that it is nothing of a
+    /// sensor's.
+    pub fn of_sensors(&self, logs: &[ContactLog], fitted: &Self, slides: &[bool], zero_nm: f64) -> Vec<f64> {
+        let slow = fitted.slow.min(zero_nm * zero_nm);
+        let line = logs
+            .iter()
+            .flat_map(|log| std::iter::repeat_n(log.mains.map_or(0.0, |line| line.variance), log.len()));
+        let slow = slides.iter().map(|slides| if *slides { slow } else { 0.0 });
+        let besides = line.zip(slow).map(|(line, slow)| line + slow);
+        self.named.iter().zip(besides).map(|(named, besides)| (named * named + besides).sqrt()).collect()
+    }
+
     fn weigh(&mut self, logs: &[ContactLog], factors: &[f64; SOURCES]) {
         let sum = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
         let mut variance: Vec<f64> = self.sources.iter().map(sum).collect();
@@ -304,6 +319,7 @@ impl Noise {
     /// tell more for that. So whitening takes from what is slow and adds to nothing.
     pub fn refit_coloured(&mut self, logs: &[ContactLog], r: &[f64], slides: &[bool]) {
         let of_each = self.slow_variance(logs, r, slides);
+        self.slow = SLOW as f64 * of_each;
         self.refit(logs, r);
         let mut from = 0;
         let rows = |log: &ContactLog| {

@@ -169,6 +169,13 @@ pub struct Prediction {
     pub ringing: Option<(f64, f64)>,
 }
 
+impl Prediction {
+    /// Where the tip slides, all logs on end.
+    pub fn slides(&self) -> Vec<bool> {
+        self.observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect()
+    }
+}
+
 /// A fitted hypothesis.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -636,8 +643,7 @@ impl<'a> Problem<'a> {
 
     /// Where the tip slides.
     pub fn slides(&self, fit: &Fit) -> Vec<bool> {
-        let observed = self.predict(&fit.terms, &fit.p).observed;
-        observed.iter().flat_map(|o| o.sliding.iter().map(|s| *s > 0.5)).collect()
+        self.predict(&fit.terms, &fit.p).slides()
     }
 }
 
