@@ -154,8 +154,8 @@ pub fn errors(
         }
     } else if let Some(drive) = &found.drive {
         // Through the filter of the training logs.
-        let inertia = drive.solved.iter().find(|s| s.set.is_empty()).map_or(0.0, |s| s.p[drive::INERTIA]);
-        let drives = logs.iter().map(|log| DriveLog::new(log, inertia)).collect::<Result<Vec<_>, _>>()?;
+        let drives =
+            logs.iter().map(|log| DriveLog::new(log, drive.inertia)).collect::<Result<Vec<_>, _>>()?;
         out.push((Part::Drive, drive_errors(found, drive, &drives, None, &[], training)));
     }
     Ok(out)
@@ -360,7 +360,7 @@ fn drive_alternatives(
             balance: &balance,
             company: Company { forms: &[], residual: &residual },
             rotary: !found.linear_stage,
-            inertia: none.p[drive::INERTIA],
+            inertia: part.inertia,
             fixed: Some(&own.constants),
             bearing,
         };

@@ -33,6 +33,9 @@ pub struct Linear {
     pub unit: &'static str,
     /// Scales of the drive's columns.
     pub drive_scales: Option<DriveScales>,
+    /// Inertia of motor and disc together with which the drive's forms were made: their numbers are parts of it. 0 where there is
+    /// no drive.
+    pub inertia: f64,
     /// Scales of the normal-load actuator's columns.
     pub normal_load_scales: Option<NormalLoadScales>,
     /// Effects of which the contact tells: its channel is what that one says, and nothing else.
@@ -202,6 +205,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
         coordinates: drive::coordinates(logs, rotary),
         unit: if rotary { "N m" } else { "N" },
         drive_scales: Some(scales),
+        inertia,
         normal_load_scales: None,
         heard: Vec::new(),
     }
@@ -243,6 +247,7 @@ pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
         coordinates: normal_load::coordinates(logs),
         unit: "N m",
         drive_scales: None,
+        inertia: 0.0,
         normal_load_scales: Some(scales),
         heard: Vec::new(),
     }

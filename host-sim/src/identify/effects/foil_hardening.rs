@@ -22,7 +22,8 @@ impl Effect for FoilHardening {
         About {
             id: "foil_hardening",
             meaning: "the springs' force grows faster than linearly",
-            experiment: "ramp M1's torque slowly over its whole range",
+            experiment: "ramp M1's torque slowly over its whole range, with the elements lifted and pressed: a ripple of M1 with less \
+                         than two periods over the travel looks the same, but shows lifted too",
         }
     }
 
