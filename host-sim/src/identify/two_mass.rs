@@ -374,7 +374,7 @@ fn refined(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::identify::balance::Company;
     use crate::identify::drive::{self, DrivePrior, DriveScales};
@@ -387,7 +387,7 @@ mod tests {
 
     /// A disc that is rubbed and swings behind a coupling under a torque of three sines, with rests, without which nothing tells the
     /// noise of the angle; that in counts of 120 000 a turn.
-    fn log(torque: impl Fn(f64, f64) -> f64) -> DriveLog {
+    pub(in crate::identify) fn swinging_disc(torque: impl Fn(f64, f64) -> f64) -> DriveLog {
         borne(torque, [0.02, 0.0], 0.0)
     }
 
@@ -465,7 +465,7 @@ mod tests {
     #[test]
     fn a_spring_that_hardens_is_found_with_its_hardening() {
         let (k, beta, d) = (200.0, 1200.0, 0.1);
-        let log = log(|twist, rate| k * twist * (1.0 + beta * twist * twist) + d * rate);
+        let log = swinging_disc(|twist, rate| k * twist * (1.0 + beta * twist * twist) + d * rate);
         let grid = [Coupling::spring(17.0, 0.03, 0.65), Coupling::spring(34.0, 0.03, 0.65)];
         let found = found("shaft_torsion", log, &grid);
         assert_near(&found, "stiffness_nm_per_rad", k, 0.03);
@@ -510,7 +510,7 @@ mod tests {
     #[test]
     fn a_spring_of_two_stages_is_found_with_its_soft_one() {
         let (k, soft, half, d) = (260.0, 0.45, 0.012, 0.1);
-        let log = log(|twist: f64, rate| {
+        let log = swinging_disc(|twist: f64, rate| {
             let beyond = (twist.abs() - half).max(0.0) * twist.signum();
             k * (soft * twist + (1.0 - soft) * beyond) + d * rate
         });
@@ -524,7 +524,7 @@ mod tests {
     #[test]
     fn play_is_found_with_its_width() {
         let (k, gap, d) = (1100.0, 0.02, 0.5);
-        let log = log(|twist: f64, rate| {
+        let log = swinging_disc(|twist: f64, rate| {
             let overlap = (twist.abs() - 0.5 * gap).max(0.0) * twist.signum();
             let carried = k * overlap + d * rate;
             if overlap * carried > 0.0 { carried } else { 0.0 }
