@@ -5,12 +5,15 @@
 //! take for friction is decided by the drive, without a rule.
 
 use super::contact::log::ContactLog;
+use super::contact::noise::MODEL_FORM;
+use super::contact::ringing::fast_line;
 use super::contact_part::{self, ContactPart};
 use super::drive::{DriveLog, DrivePrior};
+use super::filters::rms;
 use super::law_form::LAW_FORM;
 use super::linear_part::{self, Linear};
 use super::normal_load::NormalLoadLog;
-use super::rest::{self, Rest};
+use super::rest::{self, BEYOND_FORM, Rest};
 use super::table::{Candidate, Hypothesis, Part, TooSmall, table};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
@@ -103,6 +106,9 @@ pub fn judge(
     judgement.share_with_alike();
     Ok(judgement)
 }
+
+/// A torque ring's mode is known to this share of it: bridges and rings are bolted on and taken off.
+const RING_KNOWN: f64 = 0.1;
 
 /// The balances, searched.
 #[derive(Default)]
@@ -206,6 +212,7 @@ fn of_contact_logs(
 ) -> Result<Found, InputError> {
     let logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
     let mut notes: Vec<String> = train.iter().filter_map(speed_note).collect();
+    notes.extend(logs.iter().filter_map(|log| ring_note(log, rig)));
     progress("drive");
     let drive = Motors::search_drive(rig, &logs);
     let mut contact = ContactPart::searched(logs, (model, rig), drive.as_ref(), progress);
@@ -235,6 +242,27 @@ fn speed_note(log: &Log) -> Option<String> {
         1e3 * std_s,
         if lag_s > 0.0 { "behind" } else { "ahead of" }
     ))
+}
+
+/// What is said of a torque ring that rings too fast to be followed from sample to sample, and not where its mode would be seen: it
+/// is taken for noise, and no cause.
+fn ring_note(log: &ContactLog, rig: &RigFile) -> Option<String> {
+    let mode_hz = rig.friction_bridge.mode?.mode_hz;
+    let rate_hz = log.grid.step_s.recip();
+    log.ringing.as_ref()?;
+    let (cycles, rms_nm) = fast_line(&log.friction_nm)?;
+    let seen_hz = cycles * rate_hz;
+    let expected_hz = (mode_hz - rate_hz * (mode_hz / rate_hz).round()).abs();
+    let large = rms_nm > BEYOND_FORM * MODEL_FORM * rms(&log.friction_nm);
+    let elsewhere = (seen_hz - expected_hz).abs() > RING_KNOWN * mode_hz;
+    (large && elsewhere).then(|| {
+        format!(
+            "{}: the friction torque rings at {seen_hz:.0} Hz or what sampling mirrors there, {:.0} Hz; the mode of the rig file, \
+             {mode_hz:.0} Hz, would be seen at {expected_hz:.0} Hz: log faster, and set friction_bridge.mode_hz",
+            log.source,
+            rate_hz - seen_hz,
+        )
+    })
 }
 
 /// A drive alone, of which nothing is known beforehand.

@@ -17,7 +17,7 @@ const BLOCKS_S: [f64; 2] = [0.05, 0.005];
 /// Deviations from named sources are known within this factor before anything is fitted to the residuals.
 pub const NAMED_WITHIN: f64 = 1.5;
 /// What a form is known to, [`MODEL_FORM`] of the signal or a share of a cause, so many times is beyond it, whatever its shape.
-const BEYOND_FORM: f64 = 3.0;
+pub const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
 const MOST: f64 = 0.5;
 /// In a linear balance a cause that changes the prediction by less than this share of what is left may be a part of that.
@@ -27,10 +27,10 @@ const LEAST_SHARE: f64 = 0.05;
 /// Steepness of the steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
 const STEEPNESS: f64 = 8.0;
 
-/// How many times the noise of named sources is what is left in these rows: no less, and no more than they are known within.
+/// How many times the noise of named sources is what is left in these rows, as far as they are known within that.
 pub fn over_named(named: &[f64], left: &[f64], rows: &[usize]) -> f64 {
     let squares = |of: &[f64]| rows.iter().map(|&i| of[i] * of[i]).sum::<f64>();
-    (squares(left) / squares(named).max(f64::MIN_POSITIVE)).sqrt().clamp(1.0, NAMED_WITHIN)
+    (squares(left) / squares(named).max(f64::MIN_POSITIVE)).sqrt().clamp(NAMED_WITHIN.recip(), NAMED_WITHIN)
 }
 
 /// What is left of a balance.

@@ -61,6 +61,16 @@ impl Spectrum {
         used.chunks_exact(used.len() / BANDS).map(median).fold(f64::INFINITY, f64::min).sqrt()
     }
 
+    /// Where the density is largest beyond so many cycles per sample, and the variance there beside white noise.
+    pub fn beyond(&self, cycles: f64) -> (f64, f64) {
+        let white = self.white_deviation().powi(2);
+        let from = ((cycles / self.step).ceil() as usize).min(self.density.len() - 1);
+        let beyond = || self.density.iter().enumerate().skip(from);
+        let largest = beyond().max_by(|a, b| a.1.total_cmp(b.1)).map_or(from, |(at, _)| at);
+        let variance = 2.0 * self.step * beyond().map(|(_, density)| (density - white).max(0.0)).sum::<f64>();
+        (largest as f64 * self.step, variance)
+    }
+
     /// Frequencies of the highest peaks over what is around them, in cycles per sample, the highest first.
     pub fn peaks(&self, most: usize) -> Vec<f64> {
         let n = self.density.len();

@@ -9,6 +9,6 @@ pub mod log;
 pub(in crate::identify) mod noise;
 pub mod observer;
 pub mod problem;
-mod ringing;
+pub mod ringing;
 pub mod search;
 mod struck_mode;

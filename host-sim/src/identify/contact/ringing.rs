@@ -10,7 +10,10 @@
 //! milliseconds, and s of variance (1 − d²) E/2. Kalman's filter turns residuals into innovations, which are independent with the
 //! variances it gives. It is the same linear map for all hypotheses, with determinant 1, so that their likelihoods compare.
 
+use std::f64::consts::TAU;
+
 use crate::identify::filters::gaussian;
+use crate::identify::spectrum::Spectrum;
 
 /// Width of the filter that passes what is fast, samples: of what is seen at 0.4 cycles per sample 75 % pass, of what stands 0.1 %.
 const FAST: f64 = 1.2;
@@ -30,6 +33,12 @@ pub struct Ringing {
     rotations: Vec<[f64; 2]>,
     /// Variance of what is new, by sample.
     strikes: Vec<f64>,
+}
+
+/// Cycles per sample at which most of what a channel swings with is that is too fast to be followed, and the RMS of all that.
+pub fn fast_line(channel: &[f64]) -> Option<(f64, f64)> {
+    let (cycles, variance) = Spectrum::new(channel)?.beyond(FASTER.acos() / TAU);
+    Some((cycles, variance.sqrt()))
 }
 
 /// A filter in which the noise of each sample is known.
@@ -178,6 +187,17 @@ mod tests {
             let at = |share: f64| sizes[(share * sizes.len() as f64) as usize];
             assert!((0.5..0.74).contains(&at(0.5)), "{hz}: {}", at(0.5));
             assert!((1.5..2.2).contains(&at(0.95)) && at(0.995) < 4.0, "{hz}: {} {}", at(0.95), at(0.999));
+        }
+    }
+
+    #[test]
+    fn a_ring_is_seen_where_sampling_mirrors_it() {
+        for hz in [620.0, 550.0, 680.0, 1430.0] {
+            let (cycles, rms_nm) = fast_line(&struck(hz, 1.0).0).expect("long enough");
+            let mirrored = (STEP_S * hz - (STEP_S * hz).round()).abs();
+            // Within the half width of a mode with so much damping.
+            assert!((cycles - mirrored).abs() < 0.02 * STEP_S * hz, "{hz}: {cycles} for {mirrored}");
+            assert!(rms_nm > NOISE, "{hz}: {rms_nm}");
         }
     }
 
