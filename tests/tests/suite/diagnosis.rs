@@ -51,6 +51,12 @@ fn a_clean_log_is_answered_with_nothing() {
         "{:?}",
         written.diagnosis.notes
     );
+    // What is left is what noise alone leaves, as well as noise is known.
+    for (part, of_part) in &written.diagnosis.subsystems {
+        let errors = &of_part.extended;
+        let over = errors.holdout_nrmse.unwrap() / errors.noise_floor_nrmse.unwrap();
+        assert!((1.0 / 1.5..1.5).contains(&over), "{part}: {over} times the noise");
+    }
 }
 
 const APART: &str = "the held-out runs show something that the training runs do not";
