@@ -278,8 +278,7 @@ fn known_forms<'f>(
                 && a.parameters.iter().zip(&own.parameters).all(|(a, b)| a.name == b.name)
         };
         let form = fixed.iter().find(same)?;
-        let one_log = form.parameters.iter().any(|p| p.name.contains("_log"));
-        Some((form, (!one_log).then(|| &solved.p[places])))
+        Some((form, (!form.is_of_each_log()).then(|| &solved.p[places])))
     })
 }
 

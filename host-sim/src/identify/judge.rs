@@ -319,6 +319,16 @@ impl Judgement {
         }
     }
 
+    /// Causes of the answer in a balance of which each log has values of its own: nothing of them is predicted of another log.
+    pub fn of_each_log(&self, part: Part) -> Vec<&'static str> {
+        let linear = match part {
+            Part::Friction => None,
+            Part::Drive => self.drive.as_ref(),
+            Part::Pressure => self.normal_load.as_ref(),
+        };
+        linear.zip(self.place(part)).map_or(Vec::new(), |(linear, place)| linear.of_each_log(place))
+    }
+
     /// Whether the hypothesis at a place predicts what the answer does, to the form of that one's cause at `own`.
     fn alike(&self, own: usize, at: usize) -> bool {
         let (best, other) = (self.best(), &self.hypotheses[at]);

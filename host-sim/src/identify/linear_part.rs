@@ -143,6 +143,12 @@ impl Linear {
         self.balance.difference(&a, &b) / self.balance.scale.max(1e-12)
     }
 
+    /// Effects of a set of which each log has values of its own.
+    pub fn of_each_log(&self, place: usize) -> Vec<&'static str> {
+        let forms = self.solved[place].forms(&self.alternatives).map(|(form, _)| form);
+        forms.filter(|form| form.is_of_each_log()).map(|form| form.effect).collect()
+    }
+
     /// What a set leaves.
     pub fn rest(&self, place: usize) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());

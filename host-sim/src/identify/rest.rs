@@ -17,7 +17,7 @@ const BLOCKS_S: [f64; 2] = [0.05, 0.005];
 /// Deviations from named sources are known within this factor before anything is fitted to the residuals.
 pub const NAMED_WITHIN: f64 = 1.5;
 /// What a form is known to, [`MODEL_FORM`] of the signal or a share of a cause, so many times is beyond it, whatever its shape.
-pub const BEYOND_FORM: f64 = 3.0;
+pub(super) const BEYOND_FORM: f64 = 3.0;
 /// The rest is most of what is unexplained where it is this share of what the smallest named cause changes.
 const MOST: f64 = 0.5;
 /// In a linear balance a cause that changes the prediction by less than this share of what is left may be a part of that.

@@ -315,6 +315,8 @@ fn apart(found: &Found<'_>) -> Vec<Apart> {
             let train = found.train.iter().find(|(p, _)| p == part).and_then(|(_, errors)| ratio(errors))?;
             Some(Apart { part: *part, times_noise: [ratio(holdout)?, train] })
         })
+        // What is not predicted says nothing of the runs.
+        .filter(|apart| found.judgement.of_each_log(apart.part).is_empty())
         // Noise is known within the factor; a training log that is better than it is so by chance or by fitting.
         .filter(|apart| apart.times_noise[0] > NAMED_WITHIN * apart.times_noise[1].max(1.0))
         .collect()
@@ -351,6 +353,13 @@ fn cause(found: &Found<'_>, id: &'static str, size: f64, probability: f64) -> Ca
                 moves(base, extended),
                 percent(noise)
             ));
+            if judged.of_each_log(*part).contains(&id) {
+                evidence.push(
+                    "each log has values of its own for it, as the phase of a pattern is under an incremental encoder: of it nothing \
+                     is predicted on held-out logs"
+                        .into(),
+                );
+            }
         }
     }
     let parameters = found.values.get(id).map_or(BTreeMap::new(), |values| {

@@ -81,6 +81,11 @@ impl Alternative {
         self.disc.is_some() && self.response.is_some()
     }
 
+    /// Whether each log has values of its own, as the phase of a pattern under an incremental encoder: of another log nothing is known.
+    pub fn is_of_each_log(&self) -> bool {
+        self.parameters.iter().any(|p| p.name.contains("_log"))
+    }
+
     /// Columns alone.
     pub fn columns(effect: &'static str, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>) -> Self {
         Self {
