@@ -6,7 +6,7 @@
 
 use super::balance::{Alternative, Balance, Company, Solved};
 use super::contact::log::ContactLog;
-use super::contact::problem::{Fit, Problem, Role};
+use super::contact::problem::{Fit, Prediction, Problem, Role};
 use super::contact_part::{self, ContactPart};
 use super::drive::{self, Bearing, DriveLog, DriveScales};
 use super::effects::{self, DriveView, NormalLoadView};
@@ -184,9 +184,10 @@ fn contact_errors(
     let mut problem = Problem::new(logs, &contact.baseline, &terms);
     problem.noise = problem.noise_at(&own_terms, &fit.p);
     let logged = Problem::with_noise(as_logged, &contact.baseline, &terms, problem.noise.clone());
-    let base = contact_left(&logged, &none.terms, &none.p);
-    let extended = contact_left(&problem, &own_terms, &fit.p);
-    let noise = contact_noise(contact, fit, &problem, &problem.predict(&own_terms, &fit.p).slides());
+    let predicted = problem.predict(&own_terms, &fit.p);
+    let base = contact_left(&logged, &logged.predict(&none.terms, &none.p));
+    let extended = contact_left(&problem, &predicted);
+    let noise = contact_noise(contact, fit, &problem, &predicted);
     let mut errors = Errors::default();
     let measured: Vec<f64> = problem.measured().collect();
     let mut known = known_samples(&problem).into_iter().peekable();
@@ -203,9 +204,8 @@ fn contact_errors(
 }
 
 /// What a contact leaves, N m, but for what it was seen to swing with.
-fn contact_left(problem: &Problem<'_>, terms: &[usize], p: &[f64]) -> Vec<f64> {
-    let shown = problem.predict(terms, p).shown_nm;
-    let mut left: Vec<f64> = problem.measured().zip(shown).map(|(y, x)| y - x).collect();
+fn contact_left(problem: &Problem<'_>, predicted: &Prediction) -> Vec<f64> {
+    let mut left: Vec<f64> = problem.measured().zip(&predicted.shown_nm).map(|(y, x)| y - x).collect();
     problem.noise.innovations(&mut left);
     left
 }
@@ -219,15 +219,22 @@ fn known_samples(problem: &Problem<'_>) -> Vec<usize> {
 
 /// Deviation of each sample that noise alone leaves: that of the sensors, as many times as a fit to the training logs leaves there
 /// within what is known of it.
-fn contact_noise(contact: &ContactPart, fit: &Fit, problem: &Problem<'_>, slides: &[bool]) -> Vec<f64> {
+fn contact_noise(
+    contact: &ContactPart,
+    fit: &Fit,
+    problem: &Problem<'_>,
+    predicted: &Prediction,
+) -> Vec<f64> {
     let zero_nm = contact.baseline.deviation_of(Role::FrictionZero);
+    let of_sensors = |problem: &Problem<'_>, predicted: &Prediction| {
+        problem.noise.of_sensors(problem.logs, &contact.noise, &predicted.slides(), zero_nm)
+    };
     let mut there = contact.problem();
     there.noise = there.noise_at(&fit.terms, &fit.p);
-    let named = there.noise.of_sensors(there.logs, &contact.noise, &there.slides(fit), zero_nm);
-    let left = contact_left(&there, &fit.terms, &fit.p);
-    let times = rest::over_named(&named, &left, &known_samples(&there));
-    let of_sensors = problem.noise.of_sensors(problem.logs, &contact.noise, slides, zero_nm);
-    of_sensors.into_iter().map(|deviation| times * deviation).collect()
+    let fitted = there.predict(&fit.terms, &fit.p);
+    let left = contact_left(&there, &fitted);
+    let times = rest::over_named(&of_sensors(&there, &fitted), &left, &known_samples(&there));
+    of_sensors(problem, predicted).into_iter().map(|deviation| times * deviation).collect()
 }
 
 /// Values of a training set's columns in another balance; those of one log alone are left out.

@@ -107,7 +107,7 @@ pub fn judge(
     Ok(judgement)
 }
 
-/// A torque ring's mode is known to this share of it: bridges and rings are bolted on and taken off.
+/// A torque ring's mode is known to this share of it, as gain and preload of the rig file are: it is bolted on and taken off.
 const RING_KNOWN: f64 = 0.1;
 
 /// The balances, searched.
@@ -377,6 +377,40 @@ impl Judgement {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::signal::Signal;
+    use crate::identify::balance::Alternative;
+    use crate::identify::noise::tests::white;
+    use crate::identify::term::Parameter;
+
+    #[test]
+    fn a_ring_is_told_where_it_rings_elsewhere_than_the_rig_file_says() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        assert_eq!(rig.friction_bridge.mode.unwrap().mode_hz, 600.0);
+        let note = |hz: f64| {
+            let noise = white(8000, 3);
+            let time_s: Vec<f64> = (0..8000).map(|i| 1e-3 * f64::from(i)).collect();
+            let ring = |t: &f64| 0.3 * (std::f64::consts::TAU * hz * t).sin();
+            let mut log = Log::default();
+            log.set_signal(Signal::M2Speed, vec![5.0; time_s.len()]);
+            log.set_signal(Signal::NormalForce, vec![60.0; time_s.len()]);
+            let torque = time_s.iter().zip(&noise).map(|(t, n)| 3.0 + ring(t) + 0.02 * n).collect();
+            log.set_signal(Signal::FrictionTorque, torque);
+            log.set_signal(Signal::Time, time_s);
+            ring_note(&ContactLog::new(&log, &rig).unwrap(), &rig)
+        };
+        // 600 Hz is seen at 400 Hz in a log of 1 kHz, and a mode of 5 % less at 430.
+        assert_eq!([note(600.0), note(570.0)], [None, None]);
+        let told = note(517.0).unwrap();
+        assert!(told.contains("483 Hz") && told.contains("would be seen at 400 Hz"), "{told}");
+    }
+
+    #[test]
+    fn what_each_log_has_for_itself_is_known_by_its_parameters() {
+        let form = |name: &str| {
+            Alternative::columns("m2_ripple", vec![Parameter::amplitude(name, 1.0)], vec![Vec::new()])
+        };
+        assert_eq!(["cos_1", "cos_1_log2"].map(|name| form(name).is_of_each_log()), [false, true]);
+    }
 
     #[test]
     fn causes_that_predict_the_same_are_as_likely_as_each_other() {

@@ -246,13 +246,13 @@ impl Balance {
         }
         let first_deviation = deviation.clone();
         let mut balance = Self {
-            factors: vec![1.0; least.len()],
-            slow_of_each: 0.0,
             response,
             sensors: base.len(),
             base,
             deviation,
             first_deviation,
+            factors: vec![1.0; least.len()],
+            slow_of_each: 0.0,
             sources: (sources, least),
             used,
             scale,
