@@ -125,7 +125,7 @@ impl Resimulated<'_> {
         let sd = DVector::from_iterator(at_found.len(), self.baseline.free.iter().map(|b| b.parameter.sd));
         // What these logs do not determine stays: the simulated ones determine it no more, and the prior is no bias.
         let columns = problem.jacobian(&[], &found.p, &found.r);
-        let (h, _) = problem.normal_equations(columns, &found.r);
+        let (h, _) = problem.normal_equations(&columns, &found.r);
         let with_prior = &h + DMatrix::from_diagonal(&sd.map(|sd| sd.powi(-2)));
         let determined = factor(&with_prior).solve(&h);
         let mut p = at_found.clone();

@@ -208,7 +208,8 @@ pub fn identify(
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
     let (mut likely, mut under_prior) = {
-        let linearised = Linearised::new(&problem, &fit, problem.jacobian(&[], &fit.p, &fit.r));
+        let slopes = problem.jacobian(&[], &fit.p, &fit.r);
+        let linearised = Linearised::new(&problem, &fit, &slopes);
         (linearised.known(&alone), linearised.known(&prior_sd).covariance)
     };
     let mut found = fit.p.clone();

@@ -41,7 +41,7 @@ pub(super) struct Known {
 
 /// Residuals and columns −∂r/∂p of a fit, all logs on end, whitened as far as the noise is.
 pub(super) struct Linearised<'a> {
-    columns: Vec<Vec<f64>>,
+    columns: Cow<'a, [Vec<f64>]>,
     /// Residuals over their deviations; 0 where a sample takes no part.
     r: Cow<'a, [f64]>,
     /// The deviations, N m.
@@ -54,7 +54,7 @@ pub(super) struct Linearised<'a> {
 
 impl<'a> Linearised<'a> {
     /// About a fit.
-    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit, columns: Vec<Vec<f64>>) -> Self {
+    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit, columns: &'a [Vec<f64>]) -> Self {
         Self {
             columns: problem.noise.whitened_columns(columns),
             r: problem.noise.whitened(&fit.r),
@@ -171,7 +171,7 @@ mod tests {
     fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> Known {
         let deviation_nm = &vec![1.0; r.len()];
         let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
-        Linearised { columns: columns.to_vec(), r: r.into(), deviation_nm, slides, lengths }.known(prior_sd)
+        Linearised { columns: columns.into(), r: r.into(), deviation_nm, slides, lengths }.known(prior_sd)
     }
 
     #[test]

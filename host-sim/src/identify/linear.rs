@@ -152,6 +152,23 @@ pub fn normal_equations<C: AsRef<[f64]> + Sync>(
     (h, g)
 }
 
+/// Slopes of residuals (negative, a column for each parameter) mended by what a step made of the residuals: the least change,
+/// each parameter in its own width, with which they would have told it (C. G. Broyden, *Mathematics of Computation* 19, 1965).
+pub fn mend_slopes(columns: &mut [Vec<f64>], [before, after]: [&[f64]; 2], step: &[f64], widths: &[f64]) {
+    let size: f64 = step.iter().zip(widths).map(|(d, width)| (d / width).powi(2)).sum();
+    if size == 0.0 {
+        return;
+    }
+    let mut untold: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
+    for (column, d) in columns.iter().zip(step) {
+        untold.iter_mut().zip(column).for_each(|(untold, slope)| *untold -= d * slope);
+    }
+    for (column, (d, width)) in columns.iter_mut().zip(step.iter().zip(widths)) {
+        let share = d / (width * width) / size;
+        column.iter_mut().zip(&untold).for_each(|(slope, untold)| *slope += share * untold);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,6 +184,29 @@ mod tests {
             let rest: f64 = (whole..a.len()).map(|i| a[i] * b[i]).sum();
             assert_eq!(dot(&a, &b), (0..8).map(lane).sum::<f64>() + rest, "{length}");
         }
+    }
+
+    #[test]
+    fn mended_slopes_tell_the_step_and_what_is_across_it_stays() {
+        let residual = |p: [f64; 2]| vec![1.0 - p[0] - 0.3 * p[0] * p[0], 2.0 - 4.0 * p[1], p[0] * p[1]];
+        let [from, to] = [[0.2, 0.1], [0.5, -0.1]];
+        let (before, after) = (residual(from), residual(to));
+        let mut columns = vec![vec![1.0, 0.2, -0.1], vec![0.1, 3.0, -0.2]];
+        let (step, widths) = ([to[0] - from[0], to[1] - from[1]], [2.0, 0.5]);
+        // Across the step as the widths measure it.
+        let across = [step[1] / (widths[1] * widths[1]), -step[0] / (widths[0] * widths[0])];
+        let told = |columns: &[Vec<f64>], step: [f64; 2], i: usize| {
+            columns[0][i] * step[0] + columns[1][i] * step[1]
+        };
+        let of_across: Vec<f64> = (0..3).map(|i| told(&columns, across, i)).collect();
+        mend_slopes(&mut columns, [&before, &after], &step, &widths);
+        for i in 0..3 {
+            assert!((told(&columns, step, i) - (before[i] - after[i])).abs() < 1e-12, "{i}");
+            assert!((told(&columns, across, i) - of_across[i]).abs() < 1e-12, "{i}");
+        }
+        let known = columns.clone();
+        mend_slopes(&mut columns, [&before, &before], &[0.0, 0.0], &widths);
+        assert_eq!(columns, known);
     }
 
     #[test]

@@ -190,7 +190,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
     let scales = DriveScales::new(logs);
     let mut balance = drive::balance(logs, prior, &scales);
     let inertia = balance.solve(&[], &[]).p[drive::INERTIA];
-    let propose = |balance: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
+    let propose = |balance: &Balance, company: Company<'_>, wanted: &(dyn Fn(&str) -> bool + Sync)| {
         let view = DriveView {
             logs,
             scales: &scales,
@@ -201,7 +201,7 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
             fixed: None,
             bearing: None,
         };
-        LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.drive(&view)).collect()
+        LIBRARY.par_iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.drive(&view)).collect()
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
     Linear {
@@ -241,9 +241,9 @@ pub fn drive_prior(rig: &RigFile) -> DrivePrior {
 pub fn search_normal_load(logs: &[NormalLoadLog], rig: &RigFile) -> Linear {
     let scales = NormalLoadScales::new(logs);
     let mut balance = normal_load::balance(logs, rig, &scales);
-    let propose = |balance: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
+    let propose = |balance: &Balance, company: Company<'_>, wanted: &(dyn Fn(&str) -> bool + Sync)| {
         let view = NormalLoadView { logs, scales: &scales, balance, company, fixed: None };
-        LIBRARY.iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.normal_load(&view)).collect()
+        LIBRARY.par_iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.normal_load(&view)).collect()
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
     Linear {

@@ -239,22 +239,23 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         made(best, &bearing)
     };
     let bearing = borne(view.company.forms);
-    let starts = |bends: bool| -> Vec<Trial> {
-        let of = |numbers: Coupling| trial(&if bends { numbers.bent() } else { numbers }, &bearing, PULL);
-        let ways: Vec<Coupling> = grid.iter().flat_map(Coupling::borne_either_way).collect();
-        let mut tried: Vec<Trial> = ways.into_par_iter().filter_map(of).collect();
+    let tried = |of: Vec<Coupling>| -> Vec<Trial> {
+        let of_numbers = |numbers: Coupling| trial(&numbers, &bearing, PULL);
+        let mut tried: Vec<Trial> = of.into_par_iter().filter_map(of_numbers).collect();
         tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
-        // Of each width the best, so that the fits do not all start in one valley.
-        let mut widths: Vec<f64> = Vec::new();
-        tried.retain(|t| {
-            let new = t.numbers.gap_rad == 0.0 || !widths.contains(&t.numbers.gap_rad);
-            widths.push(t.numbers.gap_rad);
-            new
-        });
-        tried.truncate(STARTS);
         tried
     };
-    let Some(plain) = best_of(starts(false), &bearing) else { return Vec::new() };
+    let mut of_grid = tried(grid.iter().flat_map(Coupling::borne_either_way).collect());
+    // Of each width the best, so that the fits do not all start in one valley.
+    let mut widths: Vec<f64> = Vec::new();
+    of_grid.retain(|t| {
+        let new = t.numbers.gap_rad == 0.0 || !widths.contains(&t.numbers.gap_rad);
+        widths.push(t.numbers.gap_rad);
+        new
+    });
+    let best_bent = of_grid.iter().map(|t| t.numbers.bent()).collect();
+    of_grid.truncate(STARTS);
+    let Some(plain) = best_of(of_grid, &bearing) else { return Vec::new() };
     let nothing = view.balance.solve_forms(view.company.forms).log_evidence;
     if plain.0.solved.log_evidence + plain.1 < nothing {
         // Where nothing asks for a coupling, its numbers are of no account.
@@ -264,9 +265,11 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         None
     } else {
         let stages = plain.0.numbers.in_stages(view.inertia, view.scales.effort);
-        best_of(stages.par_iter().filter_map(|numbers| trial(numbers, &bearing, PULL)).collect(), &bearing)
+        best_of(tried(stages), &bearing)
     };
-    let bent = best_of(starts(true), &bearing);
+    let mut best_bent = tried(best_bent);
+    best_bent.truncate(STARTS);
+    let bent = best_of(best_bent, &bearing);
     // Over the edge of a dead zone the likelihood is rough, and over a rounded one it is not: what was found there is a start too.
     let unbent = bent.as_ref().and_then(|(bent, _)| {
         let start = trial(&Coupling { bend: 0.0, ..bent.numbers }, &bearing, PULL)?;
@@ -331,7 +334,7 @@ fn refined(
             moved(step).or_else(|| moved(-step))
         };
         let taken = slopes.take().or_else(|| (0..p.len()).into_par_iter().map(slope).collect());
-        let Some(columns) = taken else { break };
+        let Some(mut columns) = taken else { break };
         let weights: Vec<f64> =
             r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
         let (h, g) = linear::normal_equations(&columns, &weights, r);
@@ -348,23 +351,25 @@ fn refined(
             let there = trial(&best.numbers.with(&q), &best.solved);
             let gain = there.map(|t| (t.solved.log_evidence - best.solved.log_evidence, t));
             let promised = BALANCE_SHARE * (g.dot(&d) - 0.5 * d.dot(&(&h * &d)));
-            better = gain.filter(|(gained, _)| *gained > 0.0).map(|(gained, t)| (gained, promised, t));
+            better = gain.filter(|(gained, _)| *gained > 0.0).map(|(gained, t)| (gained, promised, d, t));
             if better.is_some() {
                 break;
             }
             damping *= 10.0;
         }
-        let Some((gained, promised, there)) = better else {
+        let Some((gained, promised, step, there)) = better else {
             if fresh {
                 break;
             }
             continue;
         };
-        best = there;
-        damping = (0.3 * damping).max(1e-4);
         if gained > KEPT_PROMISE * promised {
+            let ratios = vec![1.0; step.len()];
+            linear::mend_slopes(&mut columns, [r, &there.solved.innovations], step.as_slice(), &ratios);
             slopes = Some(columns);
         }
+        best = there;
+        damping = (0.3 * damping).max(1e-4);
         // Half a unit of the likelihood itself changes no decision.
         if gained < 0.5 * BALANCE_SHARE && (fresh || slopes.is_some()) {
             break;

@@ -12,7 +12,8 @@ use crate::identify::contact::search::WORTH;
 const SHAPES: usize = 2;
 
 /// What proposes forms: of the effects that are wanted, for what these forms leave.
-pub type Propose<'p> = &'p dyn Fn(&Balance, Company<'_>, &dyn Fn(&str) -> bool) -> Vec<Alternative>;
+pub type Propose<'p> =
+    &'p (dyn Fn(&Balance, Company<'_>, &(dyn Fn(&str) -> bool + Sync)) -> Vec<Alternative> + Sync);
 
 /// Forms that stand in a balance already, and what they leave of it.
 #[derive(Debug, Clone, Copy)]
@@ -177,7 +178,7 @@ mod tests {
             ..Alternative::columns(effect, vec![Parameter::amplitude("size", 30.0)], vec![wave(k)])
         };
         // The second cause's shape is seen only where the first one is taken off.
-        let propose = |_: &Balance, company: Company<'_>, wanted: &dyn Fn(&str) -> bool| {
+        let propose = |_: &Balance, company: Company<'_>, wanted: &(dyn Fn(&str) -> bool + Sync)| {
             let second = if company.forms.is_empty() { 0.7 } else { 0.5 };
             [form("large", 0.2), form("small", second)].into_iter().filter(|f| wanted(f.effect)).collect()
         };

@@ -288,11 +288,11 @@ impl Noise {
     }
 
     /// The same of columns.
-    pub fn whitened_columns(&self, columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    pub fn whitened_columns<'c>(&self, columns: &'c [Vec<f64>]) -> Cow<'c, [Vec<f64>]> {
         if !self.whitening.is_coloured() {
-            return columns;
+            return Cow::Borrowed(columns);
         }
-        self.whitening.of_relative_columns(&columns)
+        Cow::Owned(self.whitening.of_relative_columns(columns))
     }
 
     /// Variance of the slow processes together that a sample shows, where the residuals (over the present deviations) have them.

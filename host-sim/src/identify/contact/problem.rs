@@ -494,7 +494,7 @@ impl<'a> Problem<'a> {
     /// JᵀWJ and JᵀWr of iterated least squares on what is new in each sample; it counts as so much.
     fn normal(
         &self,
-        columns: Vec<Vec<f64>>,
+        columns: &[Vec<f64>],
         r: &[f64],
         counts: impl Iterator<Item = f64>,
     ) -> (DMatrix<f64>, DVector<f64>) {
@@ -505,12 +505,13 @@ impl<'a> Problem<'a> {
     }
 
     /// The same as a fit takes them: all samples count alike.
-    pub fn normal_equations(&self, columns: Vec<Vec<f64>>, r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    pub fn normal_equations(&self, columns: &[Vec<f64>], r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
         self.normal(columns, r, std::iter::repeat(1.0 / self.noise.temper))
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
-    /// taken at the start, as long as steps gain what they promise: what is minimised is evaluated in each.
+    /// taken at the start, and all slopes are kept, mended by what each step showed, as long as steps gain what they promise:
+    /// what is minimised is evaluated in each.
     pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, slopes: Option<&Slopes>) -> Fit {
         let parameters: Vec<&Parameter> = self.parameters(terms).collect();
         let n = parameters.len();
@@ -518,14 +519,17 @@ impl<'a> Problem<'a> {
         let mut r = self.residuals(terms, &p);
         let mut cost = self.cost(terms, &p, &r);
         let mut damping = 1e-3;
-        let mut slopes = slopes.map(Cow::Borrowed);
+        let widths: Vec<f64> = parameters.iter().map(|q| q.width(TYPICAL_SCALE)).collect();
+        let mut near = slopes;
+        let mut kept: Option<Vec<Vec<f64>>> = None;
         for _ in 0..iterations {
-            let fresh = slopes.is_none();
-            let near = slopes.take().unwrap_or_else(|| Cow::Owned(self.slopes(terms, &p, &r)));
-            let j = self.jacobian_with(&near, terms, &p, &r);
-            let (mut h, mut g) = self.normal_equations(j, &r);
-            for (i, q) in parameters.iter().enumerate() {
-                let sd = q.width(TYPICAL_SCALE);
+            let fresh = near.is_none() && kept.is_none();
+            let mut j = kept.take().unwrap_or_else(|| match near.take() {
+                Some(slopes) => self.jacobian_with(slopes, terms, &p, &r),
+                None => self.jacobian(terms, &p, &r),
+            });
+            let (mut h, mut g) = self.normal_equations(&j, &r);
+            for (i, (q, sd)) in parameters.iter().zip(&widths).enumerate() {
                 h[(i, i)] += 1.0 / (sd * sd);
                 g[i] -= (p[i] - q.mean) / (sd * sd);
             }
@@ -561,13 +565,14 @@ impl<'a> Problem<'a> {
             let gained = cost - next_cost;
             let step = DVector::from_fn(n, |i, _| next[i] - p[i]);
             let promised = g.dot(&step) - 0.5 * step.dot(&(&h * &step));
+            if gained > KEPT_PROMISE * promised {
+                linear::mend_slopes(&mut j, [&r, &next_r], step.as_slice(), &widths);
+                kept = Some(j);
+            }
             (p, r, cost) = (next, next_r, next_cost);
             damping = (0.3 * damping).max(1e-6);
-            if gained > KEPT_PROMISE * promised {
-                slopes = Some(near);
-            }
             // Half a unit of log evidence changes no decision.
-            if gained < 0.5 && (fresh || slopes.is_some()) {
+            if gained < 0.5 && (fresh || kept.is_some()) {
                 break;
             }
         }
@@ -632,7 +637,7 @@ impl<'a> Problem<'a> {
 
     /// Curvature of −ln likelihood at a fit, and the slope of ln likelihood.
     fn curvature(&self, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
-        self.normal(self.jacobian(&fit.terms, &fit.p, &fit.r), &fit.r, self.noise.counts())
+        self.normal(&self.jacobian(&fit.terms, &fit.p, &fit.r), &fit.r, self.noise.counts())
     }
 
     /// Takes the noise from what a fit leaves.

@@ -185,7 +185,8 @@ pub fn beside(problem: &Problem<'_>, ranked: Vec<Ranked>, found: Vec<Fit>) -> Ve
 /// How many of the samples that swing count as one to what is fitted.
 fn repeated(problem: &Problem<'_>, fit: &Fit) -> f64 {
     let left = problem.residuals(&fit.terms, &fit.p);
-    let columns = problem.noise.whitened_columns(problem.jacobian(&fit.terms, &fit.p, &left));
+    let slopes = problem.jacobian(&fit.terms, &fit.p, &left);
+    let columns = problem.noise.whitened_columns(&slopes);
     let mut r = problem.noise.whitened(&left).into_owned();
     // Samples without a residual say nothing.
     r.iter_mut().zip(problem.noise.swinging()).for_each(|(r, swings)| *r *= f64::from(u8::from(*swings)));
@@ -383,7 +384,7 @@ fn table(
         places.push(all.len()..all.len() + columns.len());
         all.extend(columns.iter().cloned());
     }
-    let (h, g) = problem.normal_equations(all, &parent.r);
+    let (h, g) = problem.normal_equations(&all, &parent.r);
     // `prior` of the added columns: deviation and lower bound.
     let gain = |columns: &[usize], prior: &dyn Fn(usize) -> (f64, f64)| -> f64 {
         let index: Vec<usize> = (0..base_count).chain(columns.iter().copied()).collect();
