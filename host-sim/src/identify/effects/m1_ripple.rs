@@ -3,7 +3,8 @@
 //! Coordinates: M1's angle; the mechanism's position, which the normal force shows. Where the springs are the only compliance the
 //! two are one, and a law over them is a law of the spring force: then nothing parts them. Columns as those of M2's ripple.
 
-use super::waves::{self, Candidates, Waves};
+use super::joint_waves::{Candidates, Joint};
+use super::waves::{self, Waves};
 use super::{About, Effect, NormalLoadView, fixed_orders};
 use crate::identify::balance::Alternative;
 
@@ -52,12 +53,17 @@ impl Effect for M1Ripple {
             let mut wave_numbers = waves::of_travel(travel, MOST_PERIODS);
             wave_numbers.retain(|k| k * travel > LEAST_PERIODS * std::f64::consts::TAU);
             let candidates = Candidates { wave_numbers, parts: PARTS };
-            // The position dwells at the steps of the force, where a spectrum shows all orders alike.
-            for own_phase in [false, true] {
-                let orders =
-                    waves::joint(view.balance, &position, view.company, &candidates, MOST_ORDERS, own_phase);
-                for count in 1..=orders.len() {
-                    all.push(make.alternative(&orders[..count], candidates.count(), own_phase));
+            // The position dwells at the steps of the force, where a spectrum shows all orders alike. Orders that are the clearer
+            // with a phase for each log may have one phase all the same.
+            for (apart, forms) in [(false, &[false][..]), (true, &[false, true])] {
+                let orders = Joint::new(view.balance, &position, view.company, apart)
+                    .orders(&candidates, MOST_ORDERS);
+                for own_phase in forms {
+                    let joint = Joint::new(view.balance, &position, view.company, *own_phase);
+                    for count in 1..=orders.len() {
+                        let orders = joint.sharpened(&orders[..count], &candidates);
+                        all.push(make.alternative(&orders, candidates.count(), *own_phase));
+                    }
                 }
             }
         }
