@@ -364,8 +364,11 @@ fn refined(
             continue;
         };
         if gained > KEPT_PROMISE * promised {
-            let ratios = vec![1.0; step.len()];
-            linear::mend_slopes(&mut columns, [r, &there.solved.innovations], step.as_slice(), &ratios);
+            // Over play the likelihood is rough: what one step makes of it is no slope.
+            if !there.numbers.is_play() {
+                let ratios = vec![1.0; step.len()];
+                linear::mend_slopes(&mut columns, [r, &there.solved.innovations], step.as_slice(), &ratios);
+            }
             slopes = Some(columns);
         }
         best = there;
