@@ -407,7 +407,7 @@ mod tests {
     #[test]
     fn what_each_log_has_for_itself_is_known_by_its_parameters() {
         let form = |name: &str| {
-            Alternative::columns("m2_ripple", vec![Parameter::amplitude(name, 1.0)], vec![Vec::new()])
+            Alternative::columns("pattern", vec![Parameter::amplitude(name, 1.0)], vec![Vec::new()])
         };
         assert_eq!(["cos_1", "cos_1_log2"].map(|name| form(name).is_of_each_log()), [false, true]);
     }

@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::balance::{Alternative, DiscMotion, Solved};
-use super::contact::problem::{FREEDOM, KEPT_PROMISE};
+use super::contact::problem::{KEPT_PROMISE, student_weight};
 use super::coupling::{Coupling, Law};
 use super::drive::{Bearing, DriveLog, INERTIA};
 use super::effects::DriveView;
@@ -253,6 +253,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         widths.push(t.numbers.gap_rad);
         new
     });
+    // What bends a little is near what does not.
     let best_bent = of_grid.iter().map(|t| t.numbers.bent()).collect();
     of_grid.truncate(STARTS);
     let Some(plain) = best_of(of_grid, &bearing) else { return Vec::new() };
@@ -335,8 +336,7 @@ fn refined(
         };
         let taken = slopes.take().or_else(|| (0..p.len()).into_par_iter().map(slope).collect());
         let Some(mut columns) = taken else { break };
-        let weights: Vec<f64> =
-            r.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r) / balance.temper).collect();
+        let weights: Vec<f64> = r.iter().map(|r| student_weight(*r) / balance.temper).collect();
         let (h, g) = linear::normal_equations(&columns, &weights, r);
         log_occam = Some(best.numbers.log_occam(&h));
         let mut better = None;

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 
 use super::{Alternative, Balance, Solved, placed};
-use crate::identify::contact::problem::FREEDOM;
+use crate::identify::contact::problem::{FREEDOM, student_weight};
 use crate::identify::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
 use crate::identify::linear;
 use crate::identify::same_amplitude::{Seen, log_ratio};
@@ -168,7 +168,7 @@ impl Balance {
             .map(Vec::as_slice)
             .collect();
         let n = parameters.len();
-        let weight = |r: &f64| (FREEDOM + 1.0) / (FREEDOM + r * r) / self.temper;
+        let weight = |r: &f64| student_weight(*r) / self.temper;
         let first = |near: &[f64]| near.iter().map(weight).collect();
         let mut w: Vec<f64> = near.map_or_else(|| vec![1.0 / self.temper; y.len()], first);
         let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();

@@ -23,6 +23,12 @@ use crate::identify::term::{Parameter, Starts};
 
 /// Degrees of freedom of Student's t: tails for what the noise model does not name.
 pub const FREEDOM: f64 = 4.0;
+
+/// Weight of a residual over its deviation in iterated least squares.
+pub fn student_weight(r: f64) -> f64 {
+    (FREEDOM + 1.0) / (FREEDOM + r * r)
+}
+
 /// The baseline's parameters stay within so many deviations of their prior.
 const BOUND: f64 = 3.0;
 /// Slip is faster than this share of the root's usual speed.
@@ -510,8 +516,8 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
-    /// taken at the start, and all slopes are kept, mended by what each step showed, as long as steps gain what they promise:
-    /// what is minimised is evaluated in each.
+    /// taken at the start; all slopes are kept as long as steps gain what they promise, where there are causes mended by what
+    /// each step showed: what is minimised is evaluated in each.
     pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, slopes: Option<&Slopes>) -> Fit {
         let parameters: Vec<&Parameter> = self.parameters(terms).collect();
         let n = parameters.len();

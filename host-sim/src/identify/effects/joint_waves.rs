@@ -6,10 +6,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::identify::balance::{Balance, Company};
-use crate::identify::contact::problem::FREEDOM;
+use crate::identify::contact::problem::student_weight;
 use crate::identify::linear;
 
-/// Steps by which wave numbers are moved between those that were tried.
+/// Steps by which wave numbers are moved between those that were tried, at most: each squares what is left of a radian's error, and
+/// no further step is taken where one gains nothing.
 const STEPS: usize = 6;
 
 /// Wave numbers that are tried, and others between them.
@@ -65,7 +66,7 @@ impl<'a> Joint<'a> {
             balance,
             position,
             stretches: starts.iter().zip(ends).map(|(from, end)| row(*from)..row(end)).collect(),
-            weight: y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect(),
+            weight: y.iter().copied().map(student_weight).collect(),
             y,
             known: balance.whitening.of_columns(&known.collect::<Vec<_>>()),
         }
@@ -258,7 +259,7 @@ mod tests {
                 scaled(&|i| (k * position[i]).sin()),
             ];
             let y = scaled(&|i| residual[i]);
-            let weight: Vec<f64> = y.iter().map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
+            let weight: Vec<f64> = y.iter().copied().map(student_weight).collect();
             let (h, g) = linear::normal_equations(&columns, &weight, &y);
             g.dot(&linear::factor(&h).solve(&g))
         };

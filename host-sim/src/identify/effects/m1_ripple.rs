@@ -13,7 +13,8 @@ pub(super) struct M1Ripple;
 
 /// Fewer periods over the travel are a spring's law as well as a ripple.
 const LEAST_PERIODS: f64 = 1.7;
-/// Wave numbers are a half of this part of a half period off at most: a tenth of a radian at the travel's ends.
+/// Before they are sharpened, wave numbers are a half of this part of a half period off at most: a tenth of a radian at the travel's
+/// ends.
 const PARTS: usize = 8;
 /// Most periods over the travel, and most orders at once.
 const MOST_PERIODS: usize = 60;
@@ -55,11 +56,11 @@ impl Effect for M1Ripple {
             let candidates = Candidates { wave_numbers, parts: PARTS };
             // The position dwells at the steps of the force, where a spectrum shows all orders alike. Orders that are the clearer
             // with a phase for each log may have one phase all the same.
-            for (apart, forms) in [(false, &[false][..]), (true, &[false, true])] {
-                let orders = Joint::new(view.balance, &position, view.company, apart)
-                    .orders(&candidates, MOST_ORDERS);
-                for own_phase in forms {
-                    let joint = Joint::new(view.balance, &position, view.company, *own_phase);
+            let joints =
+                [false, true].map(|own| (own, Joint::new(view.balance, &position, view.company, own)));
+            for (apart, searched) in &joints {
+                let orders = searched.orders(&candidates, MOST_ORDERS);
+                for (own_phase, joint) in joints.iter().filter(|(own_phase, _)| *apart || !own_phase) {
                     for count in 1..=orders.len() {
                         let orders = joint.sharpened(&orders[..count], &candidates);
                         all.push(make.alternative(&orders, candidates.count(), *own_phase));
@@ -68,5 +69,65 @@ impl Effect for M1Ripple {
             }
         }
         all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+    use crate::identify::balance::Company;
+    use crate::identify::contact::log::ContactLog;
+    use crate::identify::noise::tests::white;
+    use crate::identify::normal_load::{NormalLoadLog, NormalLoadScales, balance};
+
+    /// Slow ramps of the torque, on which a wave over M1's angle rides.
+    fn log(rig: &RigFile, order: f64, phase: f64, seed: u64) -> Log {
+        const COUNT: usize = 8000;
+        let swing = |i: usize| 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / 4000.0).cos();
+        let angle = |i: usize| 0.05 * swing(i);
+        let series = |of: &dyn Fn(usize) -> f64| (0..COUNT).map(of).collect::<Vec<f64>>();
+        let noise = [seed, seed + 1].map(|seed| white(COUNT, seed));
+        let carried = |i: usize| 1.0 + 2.0 * swing(i);
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, series(&|i| 1e-3 * i as f64));
+        log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
+        log.set_signal(Signal::M1Torque, series(&|i| carried(i) + 0.005 * noise[0][i]));
+        log.set_signal(Signal::M1Angle, series(&angle));
+        // The setpoint does not know of the ripple, the force shows it.
+        let made = |i: usize| carried(i) + 0.2 * (order * angle(i) + phase).sin();
+        let force = |i: usize| rig.lever_gain_n_per_nm * made(i) - rig.preload_n;
+        log.set_signal(Signal::NormalForce, series(&|i| force(i) + 0.25 * noise[1][i]));
+        log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
+        log
+    }
+
+    #[test]
+    fn an_order_that_only_logs_apart_show_is_tried_in_one_phase_too() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        // Opposite phases: in one phase the two logs show nothing at this order.
+        let order = 600.0;
+        let logs = [(0.3, 1), (0.3 + std::f64::consts::PI, 3)].map(|(phase, seed)| {
+            let contact = ContactLog::new(&log(&rig, order, phase, seed), &rig).unwrap();
+            NormalLoadLog::new(&contact, &rig).unwrap()
+        });
+        let scales = NormalLoadScales::new(&logs);
+        let balance = balance(&logs, &rig, &scales);
+        let residual = balance.solve(&[], &[]).residual;
+        let company = Company { forms: &[], residual: &residual };
+        let view = NormalLoadView { logs: &logs, scales: &scales, balance: &balance, company, fixed: None };
+        let forms = M1Ripple.normal_load(&view);
+        let half_step = 0.25 * std::f64::consts::TAU / 0.05;
+        let first_is = |form: &&Alternative| {
+            let (name, value) = &form.constants[0];
+            name == "order_1" && (value - order).abs() < half_step
+        };
+        let of_order: Vec<&Alternative> = forms.iter().filter(first_is).collect();
+        assert!(of_order.iter().any(|form| !form.is_of_each_log()), "in one phase");
+        let solved = of_order.iter().find(|form| form.is_of_each_log()).expect("in a phase for each log");
+        let left = balance.rms(&balance.solve_forms(&[solved]).residual) / balance.rms(&residual);
+        assert!(left < 0.1, "{left}");
     }
 }
