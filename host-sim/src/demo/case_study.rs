@@ -17,8 +17,6 @@ use crate::report::value::with_uncertainty;
 
 /// Ticks from one logged sample to the next.
 const EVERY: usize = 10;
-/// Counts of a pulse of the encoder.
-const COUNTS_PER_PULSE: u32 = 4;
 /// The run that nothing is fitted to.
 const HELD_OUT: &str = "fig19";
 
@@ -39,10 +37,9 @@ impl CaseStudy {
     pub fn new(runs: &Runs) -> Result<Self, InputError> {
         let rig = RigFile::assumed_rig(&[])?;
         let baseline = baseline()?;
-        let counts_per_rev = rig.pulses_per_rev.saturating_mul(COUNTS_PER_PULSE);
         let steps = runs.closed_loop.iter().take(runs.comparisons.len());
         let logs = steps.map(|run| {
-            let mut log = run.recording.log(EVERY, counts_per_rev);
+            let mut log = run.recording.log(EVERY, rig.counts_per_rev());
             log.source.clone_from(&run.name);
             (run.name.as_str(), log)
         });

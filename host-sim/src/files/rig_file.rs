@@ -70,6 +70,9 @@ pub struct Shaft {
     pub motor_inertia_kg_m2: f64,
 }
 
+/// Edges of both channels of an encoder in a pulse.
+const COUNTS_PER_PULSE: u32 = 4;
+
 /// A rig in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigFile {
@@ -108,6 +111,11 @@ pub struct RigFile {
 }
 
 impl RigFile {
+    /// Counts per revolution of each encoder.
+    pub fn counts_per_rev(&self) -> u32 {
+        self.pulses_per_rev.saturating_mul(COUNTS_PER_PULSE)
+    }
+
     /// The assumed rig, with changes.
     pub fn assumed_rig(changes: &[(String, String)]) -> Result<Self, InputError> {
         let mut document = Document::parse(ASSUMED_NAME, ASSUMED)?;

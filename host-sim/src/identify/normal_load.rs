@@ -7,7 +7,7 @@
 
 use super::balance::{Balance, LogRows};
 use super::bridge_zero;
-use super::contact::log::ContactLog;
+use super::contact::log::{ContactLog, END_NOISES};
 use super::effects::coordinates::TIME;
 use super::filters::{
     adaptively_smoothed, derivative_of_motion, gaussian, largest_change, local_maximum, rms,
@@ -43,6 +43,8 @@ pub struct NormalLoadLog {
     pub torque_nm: Vec<f64>,
     /// Angle of M1, rad.
     pub angle_rad: Option<Vec<f64>>,
+    /// What the encoder does not tell of it: a count or its noise, rad.
+    pub angle_within_rad: f64,
     /// Normal force, N.
     pub normal_n: Vec<f64>,
     /// Both without their noise and with their peaks.
@@ -72,6 +74,9 @@ impl NormalLoadLog {
         // Its noise would make a smaller gain look better where levels do not tell it, and pay for what makes up for that.
         let smoothed_n = smoothed_together([(&log.normal_n, normal_noise_n), (&torque_nm, torque_noise_nm)]);
         let smoothed_torque_nm = adaptively_smoothed(&torque_nm, torque_noise_nm);
+        let count_rad = std::f64::consts::TAU / f64::from(rig.counts_per_rev());
+        let angle_noise_rad = log.m1_angle_rad.as_deref().map_or(0.0, noise::standard_deviation);
+        let angle_within_rad = count_rad.max(END_NOISES * angle_noise_rad);
         let mut mechanism = Mechanism::settled(rig, smoothed_torque_nm.first().copied().unwrap_or(0.0));
         let carried_n = smoothed_torque_nm.iter().map(|nm| mechanism.step(log.grid.step_s, *nm)).collect();
         Some(Self {
@@ -81,6 +86,7 @@ impl NormalLoadLog {
             carried_n,
             smoothed_torque_nm,
             torque_nm,
+            angle_within_rad,
             angle_rad: log.m1_angle_rad.clone(),
             filtered_n: gaussian(&smoothed_n, WIDTH, 0),
             smoothed_n,

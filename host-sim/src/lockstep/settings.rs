@@ -28,8 +28,8 @@ pub fn control_settings(rig: &RigFile, observer: &ModelFile) -> ControlSettings 
     settings.speed_loop.inertia_kg_m2 = rig.m2_inertia_kg_m2 as f32;
     settings.speed_loop.bearing_coulomb_nm = rig.bearing_coulomb_nm as f32;
     settings.speed_loop.bearing_viscous_nm_s = rig.bearing_viscous_nm_s_per_rad as f32;
-    settings.m1_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
-    settings.m2_encoder.counts_per_rev = rig.pulses_per_rev.saturating_mul(4);
+    settings.m1_encoder.counts_per_rev = rig.counts_per_rev();
+    settings.m2_encoder.counts_per_rev = rig.counts_per_rev();
     let spanning = |to: &mut BridgeSettings, bridge: &Bridge, zero_share: f64| {
         if let Some((low, high)) = bridge.sensitivity.map(|s| s.range(zero_share)) {
             let tare_limit = to.tare_limit;

@@ -51,7 +51,7 @@ impl PlantParameters {
             friction_bridge: bridge(&rig.friction_bridge),
             normal_bridge: bridge(&rig.normal_bridge),
             analogue: analogue(rig, assumed.analogue),
-            counts_per_rev: rig.pulses_per_rev.saturating_mul(4),
+            counts_per_rev: rig.counts_per_rev(),
             noise: if options.sensor_noise { assumed.noise } else { NoiseParameters::none() },
             substeps: Substeps { busy: options.substeps, ..assumed.substeps },
             elements: ElementParameters::from_file(model),

@@ -1,6 +1,10 @@
 //! `lever_hysteresis`: normal force lags M1 torque by a Coulomb band.
+//!
+//! Stops side by side over a force or a torque, or Dahl's spring over M1's angle: in joints that swing to and fro, the spring
+//! forgets where stops remember, and only the encoder is quiet enough to tell each swing.
 
-use super::stops::{Stops, coarse, stop};
+use super::dahl::{self, Spring};
+use super::stops::{Stops, coarse, play, stop};
 use super::waves::travel;
 use super::{About, Effect, NormalLoadLog, NormalLoadView};
 use crate::identify::balance::Alternative;
@@ -12,6 +16,7 @@ pub(super) struct LeverHysteresis;
 const FORCE: &str = "usual_force_n";
 const CARRIED: &str = "usual_carried_force_n";
 const TORQUE: &str = "usual_torque_nm";
+const MOVED: &str = "travel_rad";
 /// Shortest width of the play, in shares of the usual force or torque; the longest, of what it goes over: a wider one slides both
 /// ways on less than half of it, and is a spring.
 const SHORTEST: f64 = 0.01;
@@ -72,7 +77,46 @@ impl Effect for LeverHysteresis {
             let words = ["nm", "torque within the band, N m"];
             all.push(over(TORQUE, words, s.torque_nm, |log| &log.smoothed_torque_nm));
         }
+        if wanted(MOVED) {
+            all.extend(self.spring(view));
+        }
         all
+    }
+}
+
+impl LeverHysteresis {
+    /// Dahl's spring over M1's angle, where each log has it.
+    fn spring(&self, view: &NormalLoadView<'_>) -> Option<Alternative> {
+        // An angle that rests dithers by a count, and the spring would forget.
+        let moved = view.logs.iter().map(|log| {
+            Some(play(log.angle_rad.as_deref()?, log.angle_within_rad).collect())
+        });
+        let moved: Vec<Vec<f64>> = moved.collect::<Option<_>>()?;
+        let within_rad = view.logs.iter().map(|log| log.angle_within_rad).fold(0.0, f64::max);
+        let travel_rad = moved.iter().map(|angle| travel(angle.iter().copied())).fold(0.0, f64::max);
+        let spring = Spring {
+            effect: self.id(),
+            size: 0.5 * view.scales.torque_nm,
+            sliding: "sliding_nm",
+            unit: "rad",
+            column: &|way| {
+                let of = |(log, moved): (&NormalLoadLog, &Vec<f64>)| log.filtered(&dahl::spring(moved, way));
+                view.logs.iter().zip(&moved).flat_map(of).collect()
+            },
+        };
+        let found = match view.fixed {
+            Some(fixed) => spring.of_constants(fixed)?,
+            None => {
+                let ways = [(SHORTEST * travel_rad).max(within_rad), LONGEST * travel_rad];
+                if ways[0] >= ways[1] {
+                    return None;
+                }
+                spring.searched(view.balance, view.company, ways)
+            }
+        };
+        let mut constants = found.constants;
+        constants.push((MOVED.into(), travel_rad));
+        Some(Alternative { constants, ..found })
     }
 }
 
@@ -90,19 +134,25 @@ mod tests {
     const COUNT: usize = 12_000;
     const STEPS_PER_SAMPLE: usize = 20;
 
-    /// Joints that slip in each swing of the ring after a step of the torque (Dahl 1968), and a noisy bridge.
+    /// Force of the springs over M1's angle, and the way of the joints.
+    const STIFFNESS_N_PER_RAD: f64 = 2000.0;
+    const WAY_N: f64 = 5.0;
+
+    /// Joints that slip in each swing of the ring after a step of the torque (Dahl 1968), a noisy bridge, and an encoder that
+    /// dithers.
     fn log(rig: &RigFile) -> Log {
         let h = 1e-3 / STEPS_PER_SAMPLE as f64;
         let omega = std::f64::consts::TAU * rig.pressure.mode_hz;
         let (mut torque, mut force, mut rate, mut joints) = (2.0, 50.0, 0.0, 0.0f64);
         let level = |i: usize| 1.0 + 0.5 * ((i / 300 * 7) % 9) as f64 * 0.5;
-        let (mut torques, mut forces) = (Vec::new(), Vec::new());
-        let noise = white(COUNT, 1).into_iter().zip(white(COUNT, 2));
-        for (i, (of_torque, of_force)) in noise.enumerate() {
+        let (mut torques, mut forces, mut angles) = (Vec::new(), Vec::new(), Vec::new());
+        let count_rad = std::f64::consts::TAU / f64::from(rig.counts_per_rev());
+        let noise = white(COUNT, 1).into_iter().zip(white(COUNT, 2)).zip(white(COUNT, 3));
+        for (i, ((of_torque, of_force), of_angle)) in noise.enumerate() {
             for _ in 0..STEPS_PER_SAMPLE {
                 torque += h / rig.m1.torque_lag_s * (level(i) - torque);
                 let moved = rate * h;
-                let kept = (-moved.abs() / 5.0).exp();
+                let kept = (-moved.abs() / WAY_N).exp();
                 joints = joints * kept + moved.signum() * (1.0 - kept);
                 let carries = rig.lever_gain_n_per_nm * torque - rig.preload_n - 5.0 * joints;
                 rate += h * omega * (omega * (carries - force) - 2.0 * rig.pressure.damping_ratio * rate);
@@ -110,11 +160,14 @@ mod tests {
             }
             torques.push(torque + 0.002 * of_torque);
             forces.push(force + 0.5 * of_force);
+            let counts = force / STIFFNESS_N_PER_RAD / count_rad;
+            angles.push((counts + 0.3 * of_angle).round() * count_rad);
         }
         let mut log = Log::default();
         log.set_signal(Signal::Time, (0..COUNT).map(|i| 1e-3 * i as f64).collect());
         log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
         log.set_signal(Signal::M1Torque, torques);
+        log.set_signal(Signal::M1Angle, angles);
         log.set_signal(Signal::NormalForce, forces);
         log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
         log
@@ -131,13 +184,22 @@ mod tests {
         let company = Company { forms: &[], residual: &residual };
         let view =
             NormalLoadView { logs: &logs, scales: &scales, balance: &balance, company, fixed: None };
-        let left = LeverHysteresis.normal_load(&view).into_iter().map(|form| {
-            let solved = balance.solve_forms(&[&form]);
-            (form.form, balance.rms(&solved.residual) / balance.rms(&residual))
+        let forms = LeverHysteresis.normal_load(&view);
+        let left = forms.iter().map(|form| {
+            let solved = balance.solve_forms(&[form]);
+            (form.form.clone(), balance.rms(&solved.residual) / balance.rms(&residual))
         });
         let left: Vec<(String, f64)> = left.collect();
         let of = |form: &str| left.iter().find(|(known, _)| known == form).unwrap().1;
         // A quarter less than with either of what is measured.
         assert!(of(CARRIED) < 0.75 * of(FORCE).min(of(TORQUE)), "{left:?}");
+        // The spring over the angle leaves less than that, with the way of the joints, but for swings that peak between samples.
+        let spring = forms.last().unwrap();
+        let way = STIFFNESS_N_PER_RAD * spring.constants[0].1;
+        assert!(of(&spring.form) < 0.75 * of(CARRIED) && (way / WAY_N - 1.0).abs() < 0.2, "{left:?} {way}");
+        // Held-out logs take what was found.
+        let fixed = NormalLoadView { fixed: Some(&spring.constants), ..view };
+        let [again] = &LeverHysteresis.normal_load(&fixed)[..] else { panic!("one form") };
+        assert_eq!(again.columns, spring.columns);
     }
 }

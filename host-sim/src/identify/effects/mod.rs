@@ -1,6 +1,7 @@
 //! The library: one file for each effect holds all that is known of it; this list is the only other place that names it.
 
 pub mod coordinates;
+mod dahl;
 pub mod joint_waves;
 mod stops;
 mod stribeck_curve;

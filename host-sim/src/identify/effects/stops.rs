@@ -7,8 +7,8 @@ use crate::identify::balance::{Alternative, Balance, Company};
 use crate::identify::term::Parameter;
 
 /// Factor between neighbours of the coarse grid, and steps of the fine one in it.
-const COARSE: f64 = std::f64::consts::SQRT_2;
-const FINE: i32 = 4;
+pub(super) const COARSE: f64 = std::f64::consts::SQRT_2;
+pub(super) const FINE: i32 = 4;
 /// Names of the widths among the constants.
 const WIDTH: &str = "width_";
 
@@ -18,9 +18,9 @@ pub(super) fn coarse([shortest, longest]: [f64; 2]) -> Vec<f64> {
     (0..=count).map(|i| longest * COARSE.powi(-i)).collect()
 }
 
-/// A width of the coarse grid, and the finer ones up to its neighbours.
-pub(super) fn about(width: f64) -> impl Iterator<Item = f64> {
-    (1 - FINE..FINE).map(move |step| width * COARSE.powf(f64::from(step) / f64::from(FINE)))
+/// A width of a grid whose neighbours are `factor` apart, and the finer ones up to them.
+pub(super) fn about(width: f64, factor: f64) -> impl Iterator<Item = f64> {
+    (1 - FINE..FINE).map(move |step| width * factor.powf(f64::from(step) / f64::from(FINE)))
 }
 
 /// ln prior of a width that is chosen on these grids.
@@ -92,8 +92,12 @@ impl Stops<'_> {
             (sized().map(|(width, _)| *width).collect(), largest)
         };
         let longest = coarse.first().copied().unwrap_or(0.0);
-        let mut fine: Vec<f64> =
-            asked_for(coarse).0.into_iter().flat_map(about).filter(|w| *w <= longest).collect();
+        let mut fine: Vec<f64> = asked_for(coarse)
+            .0
+            .into_iter()
+            .flat_map(|w| about(w, COARSE))
+            .filter(|w| *w <= longest)
+            .collect();
         fine.sort_by(|a, b| b.total_cmp(a));
         fine.dedup_by(|a, b| *a > 0.999 * *b);
         let (found, largest) = asked_for(&fine);
