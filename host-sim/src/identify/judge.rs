@@ -14,7 +14,7 @@ use super::law_form::LAW_FORM;
 use super::linear_part::{self, Linear};
 use super::normal_load::NormalLoadLog;
 use super::rest::{self, BEYOND_FORM, Rest};
-use super::table::{Candidate, Hypothesis, Part, TooSmall, table};
+use super::table::{Candidate, Hypothesis, Part, TooSmall, real, table};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
 use crate::files::rig_file::RigFile;
@@ -272,6 +272,51 @@ fn of_drive_logs(train: &[Log], rotary: bool) -> Result<Linear, InputError> {
     Ok(linear_part::search_drive(&logs, &DrivePrior::default(), rotary))
 }
 
+/// A hypothesis with what it leaves.
+struct Weighed {
+    hypothesis: Hypothesis,
+    rests: Rests,
+    /// Probability that what it leaves is something unknown.
+    unknown: f64,
+    /// Place of the hypothesis that explains what it leaves with one cause more, where there is one.
+    heir: Option<usize>,
+}
+
+/// Place of the best hypothesis with one cause more, if the evidence is for it: not counting that causes are improbable.
+fn with_one_more(all: &[Hypothesis], h: &Hypothesis) -> Option<usize> {
+    let larger = |other: &Hypothesis| {
+        other.effects.len() == h.effects.len() + 1
+            && h.effects.iter().all(|effect| other.effects.contains(effect))
+            && other.log_evidence() > h.log_evidence()
+    };
+    let larger = (0..all.len()).filter(|at| larger(&all[*at]));
+    larger.max_by(|a, b| all[*a].log_weight.total_cmp(&all[*b].log_weight))
+}
+
+/// As far as what a hypothesis leaves is no noise, something makes it: a cause of the library that explains it is no less likely
+/// beforehand than one that is not in it, and as far as it leaves nothing unknown itself, it takes its place.
+fn pass_on(weighed: &mut [Weighed]) {
+    let mut order: Vec<usize> = (0..weighed.len()).collect();
+    order.sort_by_key(|at| weighed[*at].hypothesis.effects.len());
+    for at in order {
+        let Some(heir) = weighed[at].heir else { continue };
+        let own = &weighed[at];
+        let more = weighed[heir].hypothesis.effects.iter().zip(&weighed[heir].hypothesis.over_floor);
+        let is_real = more
+            .filter(|(effect, _)| !own.hypothesis.effects.contains(effect))
+            .map(|(_, over)| real(*over))
+            .fold(1.0, f64::min);
+        let explained = (1.0 - weighed[heir].unknown / own.unknown.max(f64::MIN_POSITIVE)).max(0.0);
+        let passed = own.hypothesis.probability * own.unknown * is_real * explained;
+        if passed > 0.0 {
+            let left = own.hypothesis.probability - passed;
+            weighed[at].unknown = (own.hypothesis.probability * own.unknown - passed) / left;
+            weighed[at].hypothesis.probability = left;
+            weighed[heir].hypothesis.probability += passed;
+        }
+    }
+}
+
 impl Judgement {
     /// The answer.
     pub fn best(&self) -> &Hypothesis {
@@ -285,23 +330,30 @@ impl Judgement {
 
     /// The probability that what a hypothesis leaves is something unknown is that of all hypotheses, each with its own.
     fn weigh_rests(&mut self) {
-        let mut weighed: Vec<(f64, Hypothesis, Rests)> = Vec::new();
-        for h in std::mem::take(&mut self.hypotheses) {
-            let rests = if h.probability > LEAST_PROBABILITY { self.rests_of(&h) } else { Vec::new() };
+        let hypotheses = std::mem::take(&mut self.hypotheses);
+        let looked_at = |h: &Hypothesis| h.probability > LEAST_PROBABILITY;
+        let heirs: Vec<Option<usize>> =
+            hypotheses.iter().map(|h| with_one_more(&hypotheses, h).filter(|_| looked_at(h))).collect();
+        let mut weighed: Vec<Weighed> = Vec::new();
+        for (at, h) in hypotheses.into_iter().enumerate() {
+            let known = looked_at(&h) || heirs.contains(&Some(at));
+            let rests = if known { self.rests_of(&h) } else { Vec::new() };
             let unknown = rests.iter().map(|(_, rest)| rest.unknown()).fold(0.0, f64::max);
-            weighed.push((unknown, h, rests));
+            weighed.push(Weighed { hypothesis: h, rests, unknown, heir: heirs[at] });
         }
-        self.unknown = weighed.iter().map(|(unknown, h, _)| unknown * h.probability).sum::<f64>().min(1.0);
+        pass_on(&mut weighed);
+        let unknown = |w: &Weighed| w.unknown * w.hypothesis.probability;
+        self.unknown = weighed.iter().map(unknown).sum::<f64>().min(1.0);
         if self.unknown < 0.5 {
-            for (unknown, h, _) in &mut weighed {
-                h.probability *= (1.0 - *unknown) / (1.0 - self.unknown);
+            for Weighed { hypothesis, unknown, .. } in &mut weighed {
+                hypothesis.probability *= (1.0 - *unknown) / (1.0 - self.unknown);
             }
         }
-        weighed.sort_by(|a, b| b.1.probability.total_cmp(&a.1.probability));
-        if let Some((_, _, rests)) = weighed.first_mut() {
-            self.rests = std::mem::take(rests);
+        weighed.sort_by(|a, b| b.hypothesis.probability.total_cmp(&a.hypothesis.probability));
+        if let Some(best) = weighed.first_mut() {
+            self.rests = std::mem::take(&mut best.rests);
         }
-        self.hypotheses = weighed.into_iter().map(|(_, h, _)| h).collect();
+        self.hypotheses = weighed.into_iter().map(|w| w.hypothesis).collect();
     }
 
     /// What a cause in place of one of the answer's predicts alike, to what a law's form is known to, cannot be told from it,
@@ -380,6 +432,7 @@ mod tests {
     use crate::files::signal::Signal;
     use crate::identify::balance::Alternative;
     use crate::identify::noise::tests::white;
+    use crate::identify::table::LOG_PRIOR;
     use crate::identify::term::Parameter;
 
     #[test]
@@ -410,6 +463,42 @@ mod tests {
             Alternative::columns("pattern", vec![Parameter::amplitude(name, 1.0)], vec![Vec::new()])
         };
         assert_eq!(["cos_1", "cos_1_log2"].map(|name| form(name).is_of_each_log()), [false, true]);
+    }
+
+    #[test]
+    fn a_rest_that_a_cause_of_the_library_explains_is_not_unknown() {
+        // Of the probability, of what is left being unknown, and of the larger set's cause over its floor.
+        let weighed = |larger: &[&'static str], log_weight: f64, left: f64, over: f64| {
+            let one = |effects: &[&'static str], probability, log_weight, unknown| Weighed {
+                hypothesis: Hypothesis {
+                    effects: effects.to_vec(),
+                    log_weight,
+                    places: Vec::new(),
+                    sizes: vec![0.1; effects.len()],
+                    over_floor: effects.iter().map(|e| if *e == "a" { 50.0 } else { over }).collect(),
+                    probability,
+                },
+                rests: Vec::new(),
+                unknown,
+                heir: None,
+            };
+            let mut all = vec![one(&["a"], 0.8, 0.0, 0.9), one(larger, 0.2, log_weight, left)];
+            let hypotheses: Vec<Hypothesis> = all.iter().map(|w| w.hypothesis.clone()).collect();
+            all.iter_mut().for_each(|w| w.heir = with_one_more(&hypotheses, &w.hypothesis));
+            pass_on(&mut all);
+            let unknown: f64 = all.iter().map(|w| w.unknown * w.hypothesis.probability).sum();
+            (all[1].hypothesis.probability, unknown)
+        };
+        let near = |found: (f64, f64), expected: (f64, f64)| {
+            assert!((found.0 - expected.0).abs() < 1e-3 && (found.1 - expected.1).abs() < 1e-3, "{found:?}");
+        };
+        // Two nats for it, less than it is improbable beforehand: it takes the place of what would be unknown.
+        near(weighed(&["a", "b"], 2.0 + LOG_PRIOR, 0.0, 50.0), (0.92, 0.0));
+        // Evidence against it, another set, a cause that may be the model's form, and one that leaves as much: none of it.
+        near(weighed(&["a", "b"], LOG_PRIOR - 0.1, 0.0, 50.0), (0.2, 0.72));
+        near(weighed(&["b", "c"], 2.0 + LOG_PRIOR, 0.0, 50.0), (0.2, 0.72));
+        near(weighed(&["a", "b"], 2.0 + LOG_PRIOR, 0.0, 0.1), (0.2, 0.72));
+        near(weighed(&["a", "b"], 2.0 + LOG_PRIOR, 0.9, 50.0), (0.2, 0.9));
     }
 
     #[test]
