@@ -70,6 +70,9 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
     let laws = FittedLaws::new(&problem, fit);
     let FittedLaws { fit, covariance, .. } = &laws;
     let mut numbers = part.baseline.numbers(&fit.p);
+    // What changes a block changes one that is new; the bristles' numbers stand aside.
+    let mut block = problem.change(&fit.terms, &fit.p).block;
+    numbers.exchange(&mut block);
     let mut values = Values::new();
     let mut extensions = Vec::new();
     let mut at = base;
@@ -133,7 +136,7 @@ pub fn contact(part: &ContactPart, place: usize, model: &ModelFile) -> Result<Ex
         values.entry(term.effect).or_default().extend(exported);
         at += count;
     }
-    let block = problem.change(&fit.terms, &fit.p).block;
+    numbers.exchange(&mut block);
     let mut extended = with_numbers(model, &numbers, block)?;
     for extension in extensions {
         extended.extensions.push(extension);

@@ -106,6 +106,16 @@ pub struct Numbers {
     pub normal_zero_n: f64,
 }
 
+impl Numbers {
+    /// Stiffness and damping in series for those of another element, where there is one.
+    pub fn exchange(&mut self, other: &mut Option<(f64, f64)>) {
+        if let Some((stiffness_n_per_m, damping_n_s_per_m)) = other {
+            std::mem::swap(&mut self.stiffness_n_per_m, stiffness_n_per_m);
+            std::mem::swap(&mut self.damping_n_s_per_m, damping_n_s_per_m);
+        }
+    }
+}
+
 /// A baseline parameter.
 #[derive(Debug, Clone)]
 pub struct BaseParameter {
@@ -267,7 +277,12 @@ impl<'a> Problem<'a> {
             bristles_alone: n.bristles_alone
                 && change.block.is_none()
                 && self.logs.iter().all(|log| log.grid.is_dense()),
-            branches: change.branches,
+            // They stand beside a block.
+            branches: if n.bristles_alone && change.block.is_none() {
+                [(0.0, 1.0); 3]
+            } else {
+                change.branches
+            },
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,
         }

@@ -8,7 +8,7 @@ use crate::identify::contact::change::ContactTerm;
 use crate::identify::contact::problem::Numbers;
 use crate::identify::term::{Parameter, Starts};
 
-/// The effect.
+/// The effect. Where the baseline has no block it shows beside a cause that has one, and does nothing alone.
 pub(super) struct RubberRelaxation;
 
 /// Relaxation times, s.
@@ -27,10 +27,7 @@ impl Effect for RubberRelaxation {
         }
     }
 
-    fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
-        if !view.block {
-            return Vec::new();
-        }
+    fn contact(&self, _: &ContactView<'_>) -> Vec<ContactTerm> {
         let parameters = TIMES_S.map(|time_s| Parameter::positive(format!("branch_{time_s}s"), 3.0)).to_vec();
         let act = |p: &[f64], change: &mut super::Change| {
             for ((branch, size), time_s) in change.branches.iter_mut().zip(p).zip(TIMES_S) {
@@ -53,5 +50,43 @@ impl Effect for RubberRelaxation {
             out
         };
         vec![ContactTerm::any(self.id(), parameters, Starts::At(vec![vec![0.0; 3]]), act).exported(export)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::model_file::{ModelFile, ModelKind};
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+    use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
+    use crate::identify::contact::log::ContactLog;
+    use crate::identify::contact::problem::Problem;
+    use crate::identify::contact_part::contact_terms;
+    use crate::identify::effects::coordinates::Scales;
+
+    #[test]
+    fn bristles_alone_do_not_creep_and_a_block_beside_them_does() {
+        let series = |of: &dyn Fn(f64) -> f64| (0..600).map(|i| of(5e-3 * f64::from(i))).collect::<Vec<f64>>();
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, series(&|t| t));
+        log.set_signal(Signal::M2Speed, series(&|t| 0.5 * (2.0 * t).sin()));
+        log.set_signal(Signal::NormalForce, series(&|_| 60.0));
+        log.set_signal(Signal::FrictionTorque, series(&|t| 2.5 * (30.0 * (2.0 * t).sin()).tanh()));
+        let logs = [ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()];
+        let bristles = [("sigma0_n_per_m", 3e4), ("a0", 0.6), ("a1", 0.4), ("v0_m_s", 0.1)];
+        let baseline = baseline(&ModelFile::new("m", ModelKind::Lugre, &bristles).unwrap(), KNOWN_WITHIN);
+        let mut terms = contact_terms(&logs, &Scales::new(&logs), true, 1, false);
+        terms.retain(|term| term.effect == RubberRelaxation.id());
+        terms.push(ContactTerm::any("block", Vec::new(), Starts::At(Vec::new()), |_, change| {
+            change.block = Some((3e4, 160.0));
+        }));
+        let problem = Problem::new(&logs, &baseline, &terms);
+        let start: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
+        let shown = |terms: &[usize], own: &[f64]| problem.predict(terms, &[&start[..], own].concat()).shown_nm;
+        let branches = [1.0; 3];
+        assert_eq!(shown(&[0], &branches), shown(&[], &[]));
+        assert_ne!(shown(&[0, 1], &branches), shown(&[1], &[]));
     }
 }
