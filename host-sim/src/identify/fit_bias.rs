@@ -28,8 +28,8 @@ use crate::predict::{BridgeModel, ContactInputs, integral, simulate_friction};
 const ROUNDS: usize = 6;
 /// Gauss–Newton steps in a simulated log, from the numbers it was simulated with.
 const STEPS: usize = 12;
-/// A change of the numbers that is less than this share of a deviation of the prior's ends the search.
-const CONVERGED: f64 = 1e-4;
+/// The search ends where the optimum is as close to the one that was found as this share of what white noise leaves open.
+const CONVERGED: f64 = 0.05;
 
 /// What was fitted, and to what.
 pub(super) struct Resimulated<'a> {
@@ -128,6 +128,8 @@ impl Resimulated<'_> {
         let (h, _) = problem.normal_equations(&columns, &found.r);
         let with_prior = &h + DMatrix::from_diagonal(&sd.map(|sd| sd.powi(-2)));
         let determined = factor(&with_prior).solve(&h);
+        let open = factor(&with_prior).inverse().diagonal().map(f64::sqrt);
+        let converged = |missed_by: &DVector<f64>| missed_by.component_div(&open).amax() < CONVERGED;
         let mut p = at_found.clone();
         let missed = |p: &DVector<f64>| -> Result<DVector<f64>, InputError> {
             progress();
@@ -137,6 +139,9 @@ impl Resimulated<'_> {
         let mut best = (missed_by.norm(), p.clone());
         let mut inverse = DMatrix::identity(p.len(), p.len());
         for _ in 1..ROUNDS {
+            if converged(&missed_by) {
+                break;
+            }
             let step = -(&inverse * &missed_by);
             p += &step;
             let before = std::mem::replace(&mut missed_by, missed(&p)?);
@@ -145,7 +150,7 @@ impl Resimulated<'_> {
             }
             let change = &inverse * (&missed_by - before);
             let along = step.dot(&change);
-            if step.component_div(&sd).amax() < CONVERGED || along == 0.0 {
+            if along == 0.0 {
                 break;
             }
             inverse += (&step - &change) * (step.transpose() * &inverse) / along;
