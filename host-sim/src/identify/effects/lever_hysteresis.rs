@@ -114,9 +114,13 @@ impl LeverHysteresis {
                 spring.searched(view.balance, view.company, ways)
             }
         };
+        let deflection = |z: &f64| found.constants[0].1 * z;
+        let coordinate = found.columns.first().map(|column| {
+            ("deflection of the joints, rad".to_string(), column.iter().map(deflection).collect())
+        });
         let mut constants = found.constants;
         constants.push((MOVED.into(), travel_rad));
-        Some(Alternative { constants, ..found })
+        Some(Alternative { constants, coordinate, ..found })
     }
 }
 
@@ -197,6 +201,11 @@ mod tests {
         let spring = forms.last().unwrap();
         let way = STIFFNESS_N_PER_RAD * spring.constants[0].1;
         assert!(of(&spring.form) < 0.75 * of(CARRIED) && (way / WAY_N - 1.0).abs() < 0.2, "{left:?} {way}");
+        // Shown over what the joints give: within their way, and in proportion to the torque.
+        let (_, deflection) = spring.coordinate.as_ref().unwrap();
+        let way_rad = spring.constants[0].1;
+        let in_proportion = |(x, z): (&f64, &f64)| x.abs() <= way_rad && (x - way_rad * z).abs() < 1e-9;
+        assert!(deflection.iter().zip(&spring.columns[0]).all(in_proportion));
         // Held-out logs take what was found.
         let fixed = NormalLoadView { fixed: Some(&spring.constants), ..view };
         let [again] = &LeverHysteresis.normal_load(&fixed)[..] else { panic!("one form") };
