@@ -127,8 +127,9 @@ impl Resimulated<'_> {
         let columns = problem.jacobian(&[], &found.p, &found.r);
         let (h, _) = problem.normal_equations(&columns, &found.r);
         let with_prior = &h + DMatrix::from_diagonal(&sd.map(|sd| sd.powi(-2)));
-        let determined = factor(&with_prior).solve(&h);
-        let open = factor(&with_prior).inverse().diagonal().map(f64::sqrt);
+        let with_prior = factor(&with_prior);
+        let determined = with_prior.solve(&h);
+        let open = with_prior.inverse().diagonal().map(f64::sqrt);
         let converged = |missed_by: &DVector<f64>| missed_by.component_div(&open).amax() < CONVERGED;
         let mut p = at_found.clone();
         let missed = |p: &DVector<f64>| -> Result<DVector<f64>, InputError> {

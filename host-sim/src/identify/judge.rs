@@ -307,13 +307,12 @@ fn pass_on(weighed: &mut [Weighed]) {
             .map(|(_, over)| real(*over))
             .fold(1.0, f64::min);
         let explained = (1.0 - weighed[heir].unknown / own.unknown.max(f64::MIN_POSITIVE)).max(0.0);
-        let passed = own.hypothesis.probability * own.unknown * is_real * explained;
-        if passed > 0.0 {
-            let left = own.hypothesis.probability - passed;
-            weighed[at].unknown = (own.hypothesis.probability * own.unknown - passed) / left;
-            weighed[at].hypothesis.probability = left;
-            weighed[heir].hypothesis.probability += passed;
-        }
+        let share = own.unknown * is_real * explained;
+        let passed = share * own.hypothesis.probability;
+        // Where all of it goes, nothing is left that could be unknown.
+        weighed[at].unknown = (own.unknown - share) / (1.0 - share).max(f64::MIN_POSITIVE);
+        weighed[at].hypothesis.probability -= passed;
+        weighed[heir].hypothesis.probability += passed;
     }
 }
 
@@ -332,8 +331,8 @@ impl Judgement {
     fn weigh_rests(&mut self) {
         let hypotheses = std::mem::take(&mut self.hypotheses);
         let looked_at = |h: &Hypothesis| h.probability > LEAST_PROBABILITY;
-        let heirs: Vec<Option<usize>> =
-            hypotheses.iter().map(|h| with_one_more(&hypotheses, h).filter(|_| looked_at(h))).collect();
+        let heir = |h: &Hypothesis| looked_at(h).then(|| with_one_more(&hypotheses, h)).flatten();
+        let heirs: Vec<Option<usize>> = hypotheses.iter().map(heir).collect();
         let mut weighed: Vec<Weighed> = Vec::new();
         for (at, h) in hypotheses.into_iter().enumerate() {
             let known = looked_at(&h) || heirs.contains(&Some(at));
@@ -468,7 +467,7 @@ mod tests {
     #[test]
     fn a_rest_that_a_cause_of_the_library_explains_is_not_unknown() {
         // Of the probability, of what is left being unknown, and of the larger set's cause over its floor.
-        let weighed = |larger: &[&'static str], log_weight: f64, left: f64, over: f64| {
+        let weighed_from = |smaller: f64, larger: &[&'static str], log_weight: f64, left: f64, over: f64| {
             let one = |effects: &[&'static str], probability, log_weight, unknown| Weighed {
                 hypothesis: Hypothesis {
                     effects: effects.to_vec(),
@@ -482,12 +481,15 @@ mod tests {
                 unknown,
                 heir: None,
             };
-            let mut all = vec![one(&["a"], 0.8, 0.0, 0.9), one(larger, 0.2, log_weight, left)];
+            let mut all = vec![one(&["a"], 0.8, 0.0, smaller), one(larger, 0.2, log_weight, left)];
             let hypotheses: Vec<Hypothesis> = all.iter().map(|w| w.hypothesis.clone()).collect();
             all.iter_mut().for_each(|w| w.heir = with_one_more(&hypotheses, &w.hypothesis));
             pass_on(&mut all);
             let unknown: f64 = all.iter().map(|w| w.unknown * w.hypothesis.probability).sum();
             (all[1].hypothesis.probability, unknown)
+        };
+        let weighed = |larger: &[&'static str], log_weight: f64, left: f64, over: f64| {
+            weighed_from(0.9, larger, log_weight, left, over)
         };
         let near = |found: (f64, f64), expected: (f64, f64)| {
             assert!((found.0 - expected.0).abs() < 1e-3 && (found.1 - expected.1).abs() < 1e-3, "{found:?}");
@@ -499,6 +501,8 @@ mod tests {
         near(weighed(&["b", "c"], 2.0 + LOG_PRIOR, 0.0, 50.0), (0.2, 0.72));
         near(weighed(&["a", "b"], 2.0 + LOG_PRIOR, 0.0, 0.1), (0.2, 0.72));
         near(weighed(&["a", "b"], 2.0 + LOG_PRIOR, 0.9, 50.0), (0.2, 0.9));
+        // All of it.
+        near(weighed_from(1.0, &["a", "b"], 2.0 + LOG_PRIOR, 0.0, 1e9), (1.0, 0.0));
     }
 
     #[test]

@@ -39,6 +39,12 @@ fn named(effects: &[Effect], seed: u64, base: Base) -> Written {
 fn a_missing_block_is_named_where_the_baseline_is_bristles() {
     let written = named(&[Effect::ElementCompliance], 215, Base::Series);
     assert!(written.model.starts_with("kind = \"series\""), "{}", written.model);
+    // The bristles keep their own stiffness, which is many times the new block's.
+    let number = |name: &str| -> f64 {
+        let line = written.model.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(" = "));
+        line.unwrap().parse().unwrap()
+    };
+    assert!(number("sigma0_n_per_m") > 10.0 * number("k_u_n_per_m"), "{}", written.model);
 }
 
 #[test]

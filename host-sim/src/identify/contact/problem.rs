@@ -267,6 +267,7 @@ impl<'a> Problem<'a> {
         if let Some(log_factor) = &change.log_curve {
             curve.scale(log_factor);
         }
+        let has_no_block = n.bristles_alone && change.block.is_none();
         let (k, c) = change.block.unwrap_or((n.stiffness_n_per_m, n.damping_n_s_per_m));
         Contact {
             curve,
@@ -274,15 +275,9 @@ impl<'a> Problem<'a> {
             damping_n_s_per_m: c,
             bristles_n_per_m: n.bristles_n_per_m,
             // Between samples far apart the root's way is a guess, and bristles that are followed in open loop need it.
-            bristles_alone: n.bristles_alone
-                && change.block.is_none()
-                && self.logs.iter().all(|log| log.grid.is_dense()),
+            bristles_alone: has_no_block && self.logs.iter().all(|log| log.grid.is_dense()),
             // They stand beside a block.
-            branches: if n.bristles_alone && change.block.is_none() {
-                [(0.0, 1.0); 3]
-            } else {
-                change.branches
-            },
+            branches: if has_no_block { [(0.0, 1.0); 3] } else { change.branches },
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
             ageing: change.ageing,
         }

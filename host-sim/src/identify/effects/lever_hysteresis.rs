@@ -16,7 +16,6 @@ pub(super) struct LeverHysteresis;
 const FORCE: &str = "usual_force_n";
 const CARRIED: &str = "usual_carried_force_n";
 const TORQUE: &str = "usual_torque_nm";
-const MOVED: &str = "travel_rad";
 /// Shortest width of the play, in shares of the usual force or torque; the longest, of what it goes over: a wider one slides both
 /// ways on less than half of it, and is a spring.
 const SHORTEST: f64 = 0.01;
@@ -77,9 +76,7 @@ impl Effect for LeverHysteresis {
             let words = ["nm", "torque within the band, N m"];
             all.push(over(TORQUE, words, s.torque_nm, |log| &log.smoothed_torque_nm));
         }
-        if wanted(MOVED) {
-            all.extend(self.spring(view));
-        }
+        all.extend(self.spring(view));
         all
     }
 }
@@ -103,24 +100,13 @@ impl LeverHysteresis {
                 let of = |(log, moved): (&NormalLoadLog, &Vec<f64>)| log.filtered(&dahl::spring(moved, way));
                 view.logs.iter().zip(&moved).flat_map(of).collect()
             },
+            deflection: Some("deflection of the joints, rad"),
         };
-        let found = match view.fixed {
-            Some(fixed) => spring.of_constants(fixed)?,
-            None => {
-                let ways = [(SHORTEST * travel_rad).max(within_rad), LONGEST * travel_rad];
-                if ways[0] >= ways[1] {
-                    return None;
-                }
-                spring.searched(view.balance, view.company, ways)
-            }
-        };
-        let deflection = |z: &f64| found.constants[0].1 * z;
-        let coordinate = found.columns.first().map(|column| {
-            ("deflection of the joints, rad".to_string(), column.iter().map(deflection).collect())
-        });
-        let mut constants = found.constants;
-        constants.push((MOVED.into(), travel_rad));
-        Some(Alternative { constants, coordinate, ..found })
+        if let Some(fixed) = view.fixed {
+            return spring.of_constants(fixed);
+        }
+        let ways @ [shortest, longest] = [(SHORTEST * travel_rad).max(within_rad), LONGEST * travel_rad];
+        (shortest < longest).then(|| spring.searched(view.balance, view.company, ways))
     }
 }
 

@@ -53,6 +53,7 @@ impl Effect for Presliding {
             sliding: &format!("sliding_later_{of_size}"),
             unit: of_way,
             column: &|way| later(&|position| dahl::spring(position, way)),
+            deflection: None,
         };
         if let Some(fixed) = view.fixed {
             return vec![spring.of_constants(fixed).unwrap_or_else(|| stops.of_constants(fixed))];
