@@ -67,14 +67,14 @@ pub struct DiscCause {
 impl ContactPart {
     /// Searches the training logs, with what the drive says of the disc's motion.
     pub fn searched(
-        logs: Vec<ContactLog>,
+        logs: &[ContactLog],
         (model, rig): (&ModelFile, &RigFile),
         drive: Option<&Linear>,
         progress: &(dyn Fn(&str) + Sync),
     ) -> Self {
         let block = baseline::has_block(model);
         let baseline = baseline::baseline(model, baseline::KNOWN_WITHIN).with_bridge_zeros(rig);
-        let (logs, disc_cause) = with_disc_motion(logs, &baseline, drive);
+        let (logs, disc_cause) = with_disc_motion(logs.to_vec(), &baseline, drive);
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
         let mut problem = Problem::new(&logs, &baseline, &terms);

@@ -134,6 +134,8 @@ fn with_rows(linear: Option<Linear>, part: Part, what: &str, notes: &mut Vec<Str
 /// What the motors' balances make of what the contact says of its channels.
 struct Motors<'r> {
     rig: &'r RigFile,
+    /// The logs with the encoders' motion: the contact's have the disc's where a coupling parts the two.
+    logs: &'r [ContactLog],
     drive: Option<Linear>,
     normal_load: Option<Linear>,
     /// Whether the drive was searched on logs that the contact's answer changes.
@@ -156,9 +158,9 @@ impl Motors<'_> {
     /// change.
     fn hear(&mut self, contact: &ContactPart, progress: &(dyn Fn(&str) + Sync)) {
         let rig = self.rig;
-        let seen = contact_part::behind_channel(&contact.logs, &contact.best_change());
+        let seen = contact_part::behind_channel(self.logs, &contact.best_change());
         let before = std::mem::replace(&mut self.behind_channel, seen.is_some());
-        let logs = seen.as_ref().unwrap_or(&contact.logs);
+        let logs = seen.as_deref().unwrap_or(self.logs);
         if before || seen.is_some() {
             self.drive = Self::search_drive(rig, logs);
         }
@@ -175,9 +177,9 @@ impl Motors<'_> {
         let drive = self.drive.iter().map(|drive| (Part::Drive, drive.candidates()));
         let parts: Vec<_> = std::iter::once((Part::Friction, contact.candidates())).chain(drive).collect();
         let place = table(&parts).0[0].place(Part::Friction).unwrap_or(0);
-        let seen = contact_part::without_normal_end(&contact.logs, &contact.change(place));
+        let seen = contact_part::without_normal_end(self.logs, &contact.change(place));
         let before = self.without_end.replace(seen.is_some());
-        let logs = seen.as_ref().unwrap_or(&contact.logs).iter().map(|log| NormalLoadLog::new(log, rig));
+        let logs = seen.as_deref().unwrap_or(self.logs).iter().map(|log| NormalLoadLog::new(log, rig));
         let Some(logs) = logs.collect::<Option<Vec<NormalLoadLog>>>() else { return };
         if before.is_none() || before == Some(true) || seen.is_some() {
             progress("normal-load actuator");
@@ -193,6 +195,15 @@ impl Motors<'_> {
                 contact.channel_effects(Part::Pressure),
             );
         }
+    }
+
+    /// Whether the drive's best set parts the disc's motion from the encoder's.
+    fn parts_disc(&self) -> bool {
+        let parts = |drive: &Linear| {
+            let best = drive.solved.first();
+            best.is_some_and(|best| best.forms(&drive.alternatives).any(|(form, _)| form.disc.is_some()))
+        };
+        self.drive.as_ref().is_some_and(parts)
     }
 
     /// What the balances deny of the contact's best set.
@@ -215,9 +226,16 @@ fn of_contact_logs(
     notes.extend(logs.iter().filter_map(|log| ring_note(log, rig)));
     progress("drive");
     let drive = Motors::search_drive(rig, &logs);
-    let mut contact = ContactPart::searched(logs, (model, rig), drive.as_ref(), progress);
-    let mut motors = Motors { rig, drive, normal_load: None, behind_channel: false, without_end: None };
+    let searched = |drive: Option<&Linear>| ContactPart::searched(&logs, (model, rig), drive, progress);
+    let mut contact = searched(drive.as_ref());
+    let mut motors =
+        Motors { rig, logs: &logs, drive, normal_load: None, behind_channel: false, without_end: None };
     motors.hear(&contact, progress);
+    if motors.behind_channel && (contact.disc_cause.is_some() || motors.parts_disc()) {
+        // The coupling was looked for with a friction torque that is not the disc's, and the contact with its disc.
+        contact = searched(motors.drive.as_ref());
+        motors.hear(&contact, progress);
+    }
     let denied = motors.denied(&contact);
     if !denied.is_empty() {
         contact = contact.without(&denied, progress);

@@ -199,4 +199,19 @@ mod long {
         causes.sort_unstable();
         assert_eq!(causes, ["static_ageing", "viscous_film"], "{}", written.diagnosis.sentence);
     }
+
+    /// The drive hears a torque that the ring makes ring, and the contact turns with a disc that only the drive tells of.
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn a_soft_shaft_and_a_soft_ring_are_told_apart_and_predict_a_held_out_log() {
+        let written = answer(&[Effect::RingResonance, Effect::ShaftTorsion], 53_013_010, Base::BySeed);
+        let mut causes: Vec<&str> = written.diagnosis.causes.iter().map(|c| c.id.as_str()).collect();
+        causes.sort_unstable();
+        assert_eq!(causes, ["ring_resonance", "shaft_torsion"], "{}", written.diagnosis.sentence);
+        for part in ["drive", "friction"] {
+            let errors = &written.diagnosis.subsystems[part].extended;
+            let over = errors.holdout_nrmse.unwrap() / errors.noise_floor_nrmse.unwrap();
+            assert!(over < 1.2, "{part}: {over} times the noise");
+        }
+    }
 }
