@@ -174,16 +174,16 @@ impl<'a> Simulated<'a> {
             .filter_map(|start| Some((of(&start, widest)?, start)))
             .collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Not on the rig's course even by the wide filter, which passes the least: a search does not bring it there.
+        if tried.first()?.0 > self.deviation_nm {
+            return None;
+        }
         let search = |from: &[f64], width_s: f64| {
             let p = self.search(from, width_s, progress);
             Some((of(&p, width_s)?, p))
         };
         let first = tried.into_par_iter().take(SEARCHES).filter_map(|(_, start)| search(&start, widest));
         let best = first.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        // Not on the rig's course even by the wide filter, which passes the least: given up before the dear part.
-        if best.0 > self.deviation_nm {
-            return None;
-        }
         let (left, p) =
             WIDTHS_S.into_iter().skip(1).try_fold(best, |(_, from), width_s| search(&from, width_s))?;
         if left >= self.deviation_nm {
