@@ -50,6 +50,9 @@ const LEAST_SENSOR: f64 = 0.2;
 const OF_CHANNEL: std::ops::Range<usize> = 0..3;
 /// Least certainty of a sample that takes part: the way's noise is up to three quarters of the variance.
 const LEAST_CERTAINTY: f64 = 0.5;
+/// Least certainty of a sample that tells how large the sources are: the way's noise is a tenth of the variance, and however wrong
+/// it is (an encoder at rest shows none of its counts) no more of the sensor's.
+const SURE: f64 = 0.95;
 /// Frequency below which effects live, Hz; above it residuals only tell how white they are.
 const SLOW_HZ: f64 = 30.0;
 
@@ -62,6 +65,9 @@ pub struct Noise {
     /// slips and sticks faster than samples tell. It is the same for every hypothesis: one that is certain of a sample would
     /// pay for it, and one that is not would not.
     pub known: Vec<bool>,
+    /// [`certainty`](super::observer::Observed::certainty) of each sample by the numbers that this noise is of: one that moved with a
+    /// stiffness would draw it to where a sample says nothing.
+    certainty: Vec<f64>,
     /// Time in which slip and stick change faster than samples tell, in all logs together, and the time in which they are used
     /// but for that, s.
     unresolved_s: (f64, f64),
@@ -143,18 +149,20 @@ impl Noise {
         }
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
-        let certainties = prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
+        let certainties = || prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
         let times = logs
             .iter()
             .flat_map(|log| log.usable.iter().map(|used| f64::from(u8::from(*used)) * log.grid.step_s));
         let unresolved_s = times.zip(&resolved).fold((0.0, 0.0), |(out, all), (step_s, resolved)| {
             (out + if *resolved { 0.0 } else { step_s }, all + step_s)
         });
-        let known = certainties.zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
+        let known =
+            certainties().zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
         let mut noise = Self {
             sources,
             of_force,
             known,
+            certainty: certainties().copied().collect(),
             unresolved_s,
             temper: 3.0 / density,
             repeated: 1.0,
@@ -247,11 +255,16 @@ impl Noise {
         self.repeated = (samples / self.temper).max(1.0);
     }
 
-    /// What the residual of a sample has to be multiplied with where of the channel's noise only this share of its variance is
-    /// left.
+    /// What the residual of a sample has to be multiplied with: its certainty, and where of the channel's noise only this share of its
+    /// variance is left so much more.
     #[inline]
     pub fn scale(&self, sample: usize, left: f64) -> f64 {
-        if left == 1.0 { 1.0 } else { (1.0 + self.of_channel[sample] * (left - 1.0)).sqrt().recip() }
+        let certainty = self.certainty[sample];
+        if left == 1.0 {
+            certainty
+        } else {
+            certainty / (1.0 + self.of_channel[sample] * (left - 1.0)).sqrt()
+        }
     }
 
     /// Takes from what is measured less predicted what the channel was seen to swing with; all logs on end, N m.
@@ -337,7 +350,7 @@ impl Noise {
 
     /// The same with all noise as white: what is slow is in the residuals.
     pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
-        let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0).collect();
+        let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0 && self.certainty[*i] > SURE).collect();
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
         let rung = |(filter, count): &(Option<Filter>, usize)| {
             filter.as_ref().map_or_else(|| vec![0.0; *count], |filter| filter.rung.clone())

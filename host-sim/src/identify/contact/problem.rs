@@ -368,7 +368,7 @@ impl<'a> Problem<'a> {
         for (log, observed) in self.logs.iter().zip(&prediction.observed) {
             let from = left.len();
             left.extend(log.friction_nm.iter().enumerate().map(|(i, measured_nm)| {
-                let scale = observed.certainty[i] * self.noise.scale(from + i, observed.own_noise[i]);
+                let scale = self.noise.scale(from + i, observed.own_noise[i]);
                 scale * (measured_nm - prediction.shown_nm[from + i])
             }));
         }
@@ -677,9 +677,10 @@ mod tests {
     use super::super::baseline::{KNOWN_WITHIN, baseline};
     use super::*;
     use crate::files::log::Log;
-    use crate::files::model_file::ModelFile;
+    use crate::files::model_file::{ModelFile, ModelKind};
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
+    use crate::identify::noise::White;
 
     #[test]
     fn bridges_that_show_something_where_nothing_pulls_are_seen_through() {
@@ -712,5 +713,36 @@ mod tests {
             each.fold(0.0, f64::max)
         };
         assert!(off(friction_zero_nm) < 1e-9, "{}", off(friction_zero_nm));
+    }
+
+    /// Stiffer bristles make more of the way's noise, and a sample at rest would be the less certain the stiffer they are: numbers
+    /// are compared under the same weights.
+    #[test]
+    fn stiffer_bristles_do_not_pay_by_samples_that_say_less() {
+        const COUNT: usize = 4000;
+        const AT_REST: usize = COUNT / 2;
+        let mut white = White::new(5);
+        let mut noise = |size: f64| size * white.next();
+        let time = |i: usize| 1e-3 * i as f64;
+        let turns = |i: usize| if i < AT_REST { 0.0 } else { 4.0 * (2.0 * time(i - AT_REST)).sin() };
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..COUNT).map(time).collect());
+        let speed = |i: usize| if i < AT_REST { 0.0 } else { turns(i) + noise(0.02) };
+        log.set_signal(Signal::M2Speed, (0..COUNT).map(speed).collect());
+        log.set_signal(Signal::NormalForce, (0..COUNT).map(|_| 60.0 + noise(0.2)).collect());
+        let torque = |i: usize| 2.5 * (30.0 * turns(i)).tanh() + noise(0.1);
+        log.set_signal(Signal::FrictionTorque, (0..COUNT).map(torque).collect());
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [ContactLog::new(&log, &rig).unwrap()];
+        let numbers = [("sigma0_n_per_m", 1e6), ("a0", 0.7), ("a1", 0.2), ("v0_m_s", 0.3)];
+        let model = ModelFile::new("model", ModelKind::Lugre, &numbers).unwrap();
+        let baseline = baseline(&model, KNOWN_WITHIN);
+        let problem = Problem::new(&logs, &baseline, &[]);
+        let mut p: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
+        let square = |p: &[f64]| problem.residuals(&[], p)[10..AT_REST].iter().map(|r| r * r).sum::<f64>();
+        let soft = square(&p);
+        let at = baseline.free.iter().position(|b| b.role == Role::Stiffness).unwrap();
+        p[at] += 1.0;
+        assert!(square(&p) > 0.98 * soft && soft > 0.0, "{} for {soft}", square(&p));
     }
 }
