@@ -174,7 +174,7 @@ impl<'a> Simulated<'a> {
             .filter_map(|start| Some((of(&start, widest)?, start)))
             .collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Not on the rig's course even by the wide filter, which passes the least: a search does not bring it there.
+        // Not on the rig's course even by the wide filter, which passes the least: given up before the dear part.
         if tried.first()?.0 > self.deviation_nm {
             return None;
         }

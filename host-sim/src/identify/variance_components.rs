@@ -23,12 +23,15 @@ pub(super) struct Sample<'s> {
     pub(super) besides: f64,
 }
 
-/// The factors, `least` of each at least; `typical` is the samples' usual variance before.
+/// The factors, `least` of each at least; `typical` is the samples' usual variance before. 1 where there is no sample.
 pub(super) fn fitted(samples: &[Sample<'_>], least: &[f64], typical: f64) -> Vec<f64> {
     let count = least.len();
     let mut factors = vec![1.0; count];
+    if samples.is_empty() {
+        return factors;
+    }
     let strength = PRIOR_SHARE * samples.len() as f64;
-    let mean = |s: usize| samples.iter().map(|own| own.sources[s]).sum::<f64>() / samples.len().max(1) as f64;
+    let mean = |s: usize| samples.iter().map(|own| own.sources[s]).sum::<f64>() / samples.len() as f64;
     let prior: Vec<f64> = (0..count).map(|s| strength * (mean(s) / typical).powi(2) + 1e-30).collect();
     for _ in 0..PASSES {
         let (mut h, mut g) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));

@@ -35,6 +35,13 @@ fn named(effects: &[Effect], seed: u64, base: Base) -> Written {
     written
 }
 
+/// The causes of an answer, in the order of their names.
+fn sorted_causes(written: &Written) -> Vec<&str> {
+    let mut causes: Vec<&str> = written.diagnosis.causes.iter().map(|c| c.id.as_str()).collect();
+    causes.sort_unstable();
+    causes
+}
+
 #[test]
 fn a_missing_block_is_named_where_the_baseline_is_bristles() {
     let written = named(&[Effect::ElementCompliance], 215, Base::Series);
@@ -195,9 +202,8 @@ mod long {
     #[ignore = "long: cargo verify runs it"]
     fn a_film_and_ageing_are_named_together() {
         let written = answer(&[Effect::StaticAgeing, Effect::ViscousFilm], 111_013_013, Base::Series);
-        let mut causes: Vec<&str> = written.diagnosis.causes.iter().map(|c| c.id.as_str()).collect();
-        causes.sort_unstable();
-        assert_eq!(causes, ["static_ageing", "viscous_film"], "{}", written.diagnosis.sentence);
+        let named = ["static_ageing", "viscous_film"];
+        assert_eq!(sorted_causes(&written), named, "{}", written.diagnosis.sentence);
     }
 
     /// The drive hears a torque that the ring makes ring, and the contact turns with a disc that only the drive tells of.
@@ -205,9 +211,8 @@ mod long {
     #[ignore = "long: cargo verify runs it"]
     fn a_soft_shaft_and_a_soft_ring_are_told_apart_and_predict_a_held_out_log() {
         let written = answer(&[Effect::RingResonance, Effect::ShaftTorsion], 53_013_010, Base::BySeed);
-        let mut causes: Vec<&str> = written.diagnosis.causes.iter().map(|c| c.id.as_str()).collect();
-        causes.sort_unstable();
-        assert_eq!(causes, ["ring_resonance", "shaft_torsion"], "{}", written.diagnosis.sentence);
+        let named = ["ring_resonance", "shaft_torsion"];
+        assert_eq!(sorted_causes(&written), named, "{}", written.diagnosis.sentence);
         for part in ["drive", "friction"] {
             let errors = &written.diagnosis.subsystems[part].extended;
             let over = errors.holdout_nrmse.unwrap() / errors.noise_floor_nrmse.unwrap();

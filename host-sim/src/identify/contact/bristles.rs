@@ -157,7 +157,7 @@ mod tests {
         assert!(worst(false) > 0.04, "{}", worst(false));
     }
 
-    /// At rest the noise of the root's way through the stiffness tells nothing of the stiffness.
+    /// At rest the noise of the root's way comes through the stiffness, and the certainty is as much less.
     #[test]
     fn a_stiffness_has_no_weight_where_the_disc_rests() {
         const NOISE: (f64, f64) = (3e-4, 0.1);

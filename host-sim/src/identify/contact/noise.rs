@@ -149,7 +149,8 @@ impl Noise {
         }
         let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
-        let certainties = || prediction.observed.iter().flat_map(|observed| observed.certainty.iter());
+        let certainties = prediction.observed.iter().flat_map(|observed| &observed.certainty);
+        let certainty: Vec<f64> = certainties.copied().collect();
         let times = logs
             .iter()
             .flat_map(|log| log.usable.iter().map(|used| f64::from(u8::from(*used)) * log.grid.step_s));
@@ -157,12 +158,12 @@ impl Noise {
             (out + if *resolved { 0.0 } else { step_s }, all + step_s)
         });
         let known =
-            certainties().zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
+            certainty.iter().zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
         let mut noise = Self {
             sources,
             of_force,
             known,
-            certainty: certainties().copied().collect(),
+            certainty,
             unresolved_s,
             temper: 3.0 / density,
             repeated: 1.0,
@@ -176,7 +177,7 @@ impl Noise {
         noise.share_channel(&factors);
         noise.named = std::mem::take(&mut noise.deviation);
         if contact.bristles_alone {
-            // It is in the residuals' scale, with the stiffness of each point.
+            // It is in the residuals' scale, by the certainty.
             noise.sources.iter_mut().for_each(|n| n[ROOT_MOTION_SOURCE] = 0.0);
         }
         noise.weigh(logs, &[1.0; SOURCES]);
@@ -350,6 +351,7 @@ impl Noise {
 
     /// The same with all noise as white: what is slow is in the residuals.
     pub fn refit(&mut self, logs: &[ContactLog], r: &[f64]) {
+        // Bristles at rest follow the force, noise and all: residuals there are small however noisy the sensor is.
         let used: Vec<usize> = (0..r.len()).filter(|i| r[*i] != 0.0 && self.certainty[*i] > SURE).collect();
         let square: Vec<f64> = used.iter().map(|&i| (r[i] * self.deviation[i]).powi(2)).collect();
         let rung = |(filter, count): &(Option<Filter>, usize)| {
@@ -428,6 +430,44 @@ pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::log::Log;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+    use crate::identify::noise::tests::white;
+
+    #[test]
+    fn rest_says_nothing_of_how_noisy_the_sensor_is() {
+        const COUNT: usize = 8000;
+        let at_rest = |i: usize| i < COUNT / 4;
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..COUNT).map(|i| 1e-3 * i as f64).collect());
+        log.set_signal(Signal::M2Speed, vec![1.0; COUNT]);
+        log.set_signal(Signal::NormalForce, vec![50.0; COUNT]);
+        log.set_signal(Signal::FrictionTorque, white(COUNT, 2));
+        let logs = [ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()];
+        // The sensor's noise is as large as it is thought to be, and the form of a model acts where the contact moves.
+        let sources = |i: usize| {
+            let mut of: [f64; SOURCES] = [0.0; SOURCES];
+            (of[0], of[MODEL_FORM_SOURCE]) = (1.0, if at_rest(i) { 0.0 } else { 0.05 });
+            of
+        };
+        let noise = |certainty: Vec<f64>| Noise {
+            sources: (0..COUNT).map(sources).collect(),
+            certainty,
+            deviation: vec![1.0; COUNT],
+            filters: vec![(None, COUNT)],
+            ..Noise::default()
+        };
+        let small_at_rest = |(i, r): (usize, f64)| if at_rest(i) { 0.2 * r } else { r };
+        let r: Vec<f64> = white(COUNT, 7).into_iter().enumerate().map(small_at_rest).collect();
+        let mut told = noise((0..COUNT).map(|i| if at_rest(i) { 0.6 } else { 1.0 }).collect());
+        told.refit(&logs, &r);
+        assert!((0.8..1.3).contains(&told.factors[0]), "{:?}", told.factors);
+        // Where no sample tells, all is as it is thought to be.
+        let mut untold = noise(vec![0.6; COUNT]);
+        untold.refit(&logs, &r);
+        assert_eq!(untold.factors, [1.0; SOURCES]);
+    }
 
     #[test]
     fn what_either_model_does_not_resolve_is_left_out_and_told() {

@@ -90,8 +90,8 @@ pub struct Observed {
     /// Share of slip in the blend, 0 to 1.
     pub sliding: Vec<f64>,
     /// Deviation of the channel's noise over that of what the prediction leaves, 0 to 1: where bristles are held, the noise
-    /// of the root's way comes through their stiffness. A stiffness of which that leaves nothing to see has no weight there.
-    /// 1 with a block, which is some hundred times softer.
+    /// of the root's way comes through their stiffness, and what that leaves nothing to see of has no weight there. 1 with a
+    /// block, which is some hundred times softer. The likelihood takes it by the numbers that its noise model is of.
     pub certainty: Vec<f64>,
     /// Share of the variance of the channel's noise that a right law leaves, since it stands in the prediction too.
     pub own_noise: Vec<f64>,
