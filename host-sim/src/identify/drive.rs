@@ -10,7 +10,6 @@ use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
 use super::filters::{adaptively_smoothed, gaussian, largest_change, local_maximum, rms, steps, white_share};
 use super::grid::Grid;
-use super::mains;
 use super::noise;
 use super::term::Parameter;
 use crate::files::log::{Log, LogKind, unwrapped};
@@ -432,7 +431,6 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
         width: log.width,
         step_s: log.grid.step_s,
         left_out,
-        line: log.friction.as_ref().and_then(|f| mains::line(&log.filtered(f), log.grid.step_s)),
         noise: Box::new(noise),
         guessed: Box::new(guessed),
     }
@@ -523,15 +521,6 @@ mod tests {
     fn a_coupling_that_would_let_less_noise_of_the_bridge_through_is_no_better_for_it() {
         let turns = |t: f64| 2.0 * (6.0 * (0.5 * t).sin() / 0.2).tanh();
         let gained = gained_by_softening(turns, |_, noise| 0.05 * noise);
-        assert!(gained < 1.0, "{gained}");
-    }
-
-    #[test]
-    fn a_coupling_that_would_let_less_of_the_mains_through_is_no_better_for_it() {
-        // The torque never rests, so that no stretch shows what a bridge that is quiet but for its hum adds to it.
-        let swings = |t: f64| 2.0 + (std::f64::consts::TAU * 0.3 * t).sin();
-        let hum = |t: f64, noise: f64| 0.03 * (std::f64::consts::TAU * 50.0 * t + 0.4).sin() + 0.001 * noise;
-        let gained = gained_by_softening(swings, hum);
         assert!(gained < 1.0, "{gained}");
     }
 

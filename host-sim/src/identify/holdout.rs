@@ -227,7 +227,7 @@ fn contact_noise(
 ) -> Vec<f64> {
     let zero_nm = contact.baseline.deviation_of(Role::FrictionZero);
     let of_sensors = |problem: &Problem<'_>, predicted: &Prediction| {
-        problem.noise.of_sensors(problem.logs, &contact.noise, &predicted.slides(), zero_nm)
+        problem.noise.of_sensors(&contact.noise, &predicted.slides(), zero_nm)
     };
     let mut there = contact.problem();
     there.noise = there.noise_at(&fit.terms, &fit.p);

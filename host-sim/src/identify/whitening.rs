@@ -1,8 +1,7 @@
-//! What white noise, slow noise and a mains line leave new in each row: generalised least squares.
+//! What white noise and slow noise leave new in each row: generalised least squares.
 //!
-//! A row's error is e + Σ s_j + h with e white, s_j first-order processes of one variance a decade apart, which make 1/f noise
-//! (`slow_noise.rs`), and h a swing at the mains' frequency whose phase wanders as that does. The Kalman filter of that (Kalman
-//! 1960) turns a series into its innovations, which are white: response and columns alike go through it, so that what changes as
+//! A row's error is e + Σ s_j with e white and s_j first-order processes of one variance a decade apart, which make 1/f noise
+//! (`slow_noise.rs`). The Kalman filter of that (Kalman 1960) turns a series into its innovations, which are white: response and columns alike go through it, so that what changes as
 //! the noise does counts as little as it tells. Gains and deviations of the innovations depend on the rows' deviations alone and
 //! are the same for all columns.
 
@@ -12,18 +11,12 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 use wide::f64x4;
 
-use super::mains::Line;
-
 /// Time constants of the processes, s: a decade apart, from what the effective sample size counts to a log's length.
 const LONG_S: [f64; SLOW] = [0.05, 0.5, 5.0, 50.0];
 /// Processes.
 pub(super) const SLOW: usize = 4;
-/// States: the processes, and the swing with what it is a quarter of a turn later.
-const STATES: usize = SLOW + 2;
-/// For so long a mains line keeps its phase, s: that of a grid whose frequency is within 20 mHz, one deviation.
-const PHASE_KEPT_S: f64 = 8.0;
 
-type State = SVector<f64, STATES>;
+type State = SVector<f64, SLOW>;
 
 /// Columns that go through the filter together.
 const LANES: usize = 4;
@@ -40,10 +33,8 @@ struct Row {
     point: usize,
     /// What is kept of each process since the row before; nothing at the begin of a log.
     kept: [f64; SLOW],
-    /// How the swing has turned since.
-    turned: [f64; 2],
     /// What each state takes of the innovation.
-    gain: [f64; STATES],
+    gain: [f64; SLOW],
     /// Whether the processes show in it.
     shows: f64,
     /// Of the white noise.
@@ -54,21 +45,19 @@ struct Row {
 
 impl Row {
     /// The states a row on.
-    fn moves<T: Lane>(&self, state: &mut [T; STATES]) {
+    fn moves<T: Lane>(&self, state: &mut [T; SLOW]) {
         for (state, kept) in state.iter_mut().zip(self.kept) {
             *state = *state * kept;
         }
-        let ([cos, sin], [x, y]) = (self.turned, [state[SLOW], state[SLOW + 1]]);
-        (state[SLOW], state[SLOW + 1]) = (x * cos + y * sin, y * cos - x * sin);
     }
 
     /// What the row shows of the states.
-    fn shown<T: Lane>(&self, state: &[T; STATES]) -> T {
-        ((state[0] + state[1]) + (state[2] + state[3])) * self.shows + state[SLOW]
+    fn shown<T: Lane>(&self, state: &[T; SLOW]) -> T {
+        ((state[0] + state[1]) + (state[2] + state[3])) * self.shows
     }
 
     /// The innovation of a value, which the states take up.
-    fn innovation<T: Lane>(&self, value: T, state: &mut [T; STATES]) -> T {
+    fn innovation<T: Lane>(&self, value: T, state: &mut [T; SLOW]) -> T {
         self.moves(state);
         let innovation = value - self.shown(state);
         for (state, gain) in state.iter_mut().zip(self.gain) {
@@ -84,8 +73,6 @@ pub(super) struct LogPoints {
     pub(super) points: Vec<usize>,
     /// Distance of two points, s.
     pub(super) step_s: f64,
-    /// The line that its channel shows.
-    pub(super) line: Option<Line>,
 }
 
 /// The filter for the rows of a balance.
@@ -107,35 +94,30 @@ impl Whitening {
     ) -> Self {
         let mut rows = Vec::new();
         for log in logs {
-            let line = log.line.unwrap_or(Line { hz: 0.0, variance: 0.0 });
-            let stationary = State::from_fn(|j, _| if j < SLOW { of_each } else { line.variance });
-            let mut variance = SMatrix::<f64, STATES, STATES>::from_diagonal(&stationary);
+            let mut variance = SMatrix::<f64, SLOW, SLOW>::from_diagonal_element(of_each);
             let mut before: Option<usize> = None;
             for &point in &log.points {
                 let since_s = before.map(|before| (point - before) as f64 * log.step_s);
                 let kept_for = |long_s: f64| since_s.map_or(0.0, |since| (-since / long_s).exp());
-                let (sin, cos) = (std::f64::consts::TAU * line.hz * since_s.unwrap_or(0.0)).sin_cos();
                 let mut row = Row {
                     point,
                     kept: LONG_S.map(kept_for),
-                    turned: [cos, sin].map(|x| x * kept_for(PHASE_KEPT_S)),
-                    gain: [0.0; STATES],
+                    gain: [0.0; SLOW],
                     shows: f64::from(u8::from(shows(point))),
                     white: deviation[point],
                     deviation: 0.0,
                 };
                 // F P Fᵀ, columns and then rows, and what is new in each state so that its variance stays.
                 for _ in 0..2 {
-                    for j in 0..STATES {
-                        let mut column: [f64; STATES] = variance.column(j).into_owned().into();
+                    for j in 0..SLOW {
+                        let mut column: [f64; SLOW] = variance.column(j).into_owned().into();
                         row.moves(&mut column);
                         variance.set_column(j, &column.into());
                     }
                     variance = variance.transpose();
                 }
-                for j in 0..STATES {
-                    let kept = if j < SLOW { row.kept[j] } else { kept_for(PHASE_KEPT_S) };
-                    variance[(j, j)] += stationary[j] * (1.0 - kept * kept);
+                for j in 0..SLOW {
+                    variance[(j, j)] += of_each * (1.0 - row.kept[j].powi(2));
                 }
                 let seen = State::from_fn(|j, _| row.shown(&variance.column(j).into_owned().into()));
                 let of_innovation = row.white.powi(2) + row.shown(&seen.into());
@@ -147,7 +129,7 @@ impl Whitening {
                 before = Some(point);
             }
         }
-        Self { rows, coloured: of_each > 0.0 || logs.iter().any(|log| log.line.is_some()) }
+        Self { rows, coloured: of_each > 0.0 }
     }
 
     /// Whether there is anything but white noise.
@@ -165,7 +147,7 @@ impl Whitening {
         if !self.coloured {
             return self.rows.iter().map(|row| values[row.point] / row.deviation).collect();
         }
-        let mut state = [0.0; STATES];
+        let mut state = [0.0; SLOW];
         self.rows.iter().map(|row| row.innovation(values[row.point], &mut state)).collect()
     }
 
@@ -186,7 +168,7 @@ impl Whitening {
     /// The innovations of a series over the white noise's deviation, by point: 0 where there is no row.
     pub(super) fn of_relative(&self, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        let mut state = [0.0; STATES];
+        let mut state = [0.0; SLOW];
         for row in &self.rows {
             out[row.point] = row.innovation(values[row.point] * row.white, &mut state);
         }
@@ -211,7 +193,7 @@ impl Whitening {
         value: impl Fn(usize, &Row) -> f64,
         mut put: impl FnMut(usize, &Row, f64),
     ) {
-        let mut state = [f64x4::ZERO; STATES];
+        let mut state = [f64x4::ZERO; SLOW];
         for row in &self.rows {
             let values: [f64; LANES] =
                 std::array::from_fn(|lane| if lane < columns { value(lane, row) } else { 0.0 });
@@ -259,7 +241,7 @@ mod tests {
     fn innovations_of_slow_and_white_noise_are_white_and_of_deviation_one() {
         let of_each = 0.3;
         let deviations: Vec<f64> = (0..COUNT).map(deviation).collect();
-        let rows = [LogPoints { points: (0..COUNT).collect(), step_s: STEP_S, line: None }];
+        let rows = [LogPoints { points: (0..COUNT).collect(), step_s: STEP_S }];
         let (mut squares, mut before, mut after) = (0.0, 0.0, 0.0);
         const LOGS: u64 = 20;
         for seed in 0..LOGS {
@@ -278,7 +260,7 @@ mod tests {
 
     #[test]
     fn without_slow_noise_rows_are_over_their_deviation_and_a_new_log_has_forgotten() {
-        let logs = [vec![0, 2, 4], vec![6, 8]].map(|points| LogPoints { points, step_s: STEP_S, line: None });
+        let logs = [vec![0, 2, 4], vec![6, 8]].map(|points| LogPoints { points, step_s: STEP_S });
         let values: Vec<f64> = (0..10).map(f64::from).collect();
         let plain = Whitening::new(&logs, &[2.0; 10], |_| true, 0.0).of(&values);
         assert_eq!(plain, [0.0, 1.0, 2.0, 3.0, 4.0]);
@@ -294,12 +276,8 @@ mod tests {
 
     #[test]
     fn columns_go_through_beside_each_other_as_each_does_alone() {
-        let line = Some(Line { hz: 50.0, variance: 2.0 });
-        let logs = [(0..100).collect(), (110..200).collect()].map(|points| LogPoints {
-            points,
-            step_s: STEP_S,
-            line,
-        });
+        let logs =
+            [(0..100).collect(), (110..200).collect()].map(|points| LogPoints { points, step_s: STEP_S });
         let whitening = Whitening::new(&logs, &[0.5; 200], |i| i % 7 != 0, 0.3);
         let column = |seed: u64| (0..200).scan(White::new(seed), |white, _| Some(white.next())).collect();
         let columns: Vec<Vec<f64>> = (0..6).map(column).collect();
@@ -311,7 +289,7 @@ mod tests {
 
     #[test]
     fn a_row_in_which_slow_noise_does_not_show_tells_nothing_of_it() {
-        let points = LogPoints { points: (0..300).collect(), step_s: STEP_S, line: None };
+        let points = LogPoints { points: (0..300).collect(), step_s: STEP_S };
         let logs = std::slice::from_ref(&points);
         let sticks = |i: usize| (100..200).contains(&i);
         let values: Vec<f64> = (0..300).map(|i| if sticks(i) { 0.5 } else { 3.0 }).collect();
@@ -324,26 +302,5 @@ mod tests {
             white[99],
             white[200]
         );
-    }
-
-    #[test]
-    fn a_mains_line_is_known_after_a_few_turns_and_a_swing_beside_it_is_not() {
-        let line = Some(Line { hz: 50.0, variance: 2.0 });
-        let points = LogPoints { points: (0..COUNT).collect(), step_s: STEP_S, line };
-        let whitening = Whitening::new(std::slice::from_ref(&points), &[0.5; COUNT], |_| true, 0.0);
-        // It is a tenth of a hertz off, five times as far as a grid is.
-        let swing = |hz: f64| -> Vec<f64> {
-            (0..COUNT).map(|i| 2.0 * (std::f64::consts::TAU * hz * STEP_S * i as f64).sin()).collect()
-        };
-        let left = |hz: f64| crate::identify::filters::rms(&whitening.of(&swing(hz))[200..]);
-        // Over the white noise's deviation it was 2.8.
-        assert!(
-            left(50.0) < 0.1 && left(50.1) < 0.5 && left(55.0) > 2.0,
-            "{} {} {}",
-            left(50.0),
-            left(50.1),
-            left(55.0)
-        );
-        assert!(whitening.rows().skip(500).all(|(_, deviation)| (0.5..0.53).contains(&deviation)));
     }
 }

@@ -17,7 +17,6 @@ pub use self::search::{Company, Propose, search};
 use super::contact::noise::slow_share;
 use super::contact::problem::FREEDOM;
 use super::filters::{self, deviation_by_median, local_maximum};
-use super::mains::Line;
 use super::rest;
 use super::slow_noise;
 use super::term::Parameter;
@@ -142,8 +141,8 @@ pub struct Balance {
     pub row_step_s: f64,
     /// Where each log's rows begin.
     pub starts: Vec<usize>,
-    /// Distance of two points of each log, s, and what its response picks up from the mains.
-    sampled: Vec<(f64, Option<Line>)>,
+    /// Distance of two points of each log, s.
+    steps_s: Vec<f64>,
 }
 
 /// What a log gives to a balance.
@@ -154,8 +153,6 @@ pub struct LogRows<'l> {
     pub step_s: f64,
     /// Points at which the balance says nothing.
     pub left_out: Vec<bool>,
-    /// What its response picks up from the mains.
-    pub line: Option<Line>,
     /// Deviations at a point from each source that is known.
     pub noise: Box<dyn Fn(usize) -> Vec<f64> + 'l>,
     /// The same from each source that is guessed: how large it is the residuals tell.
@@ -264,7 +261,7 @@ impl Balance {
             rests: true,
             row_step_s,
             starts,
-            sampled: logs.iter().map(|log| (log.step_s, log.line)).collect(),
+            steps_s: logs.iter().map(|log| log.step_s).collect(),
         };
         balance.whiten(0.0);
         balance
@@ -273,9 +270,8 @@ impl Balance {
     /// Takes the rows' deviations, and slow processes of this variance beside them.
     fn whiten(&mut self, of_each: f64) {
         self.slow_of_each = of_each;
-        let logs = self.rows_of_logs().into_iter().zip(&self.sampled);
-        let logs: Vec<LogPoints> =
-            logs.map(|(points, &(step_s, line))| LogPoints { points, step_s, line }).collect();
+        let logs = self.rows_of_logs().into_iter().zip(&self.steps_s);
+        let logs: Vec<LogPoints> = logs.map(|(points, &step_s)| LogPoints { points, step_s }).collect();
         self.whitening = Whitening::new(&logs, &self.deviation, |_| true, of_each);
         self.white_response = self.whitening.of(&self.response);
         let base: Vec<&Vec<f64>> = self.base.iter().map(|b| &b.1).collect();
@@ -327,17 +323,11 @@ impl Balance {
     /// The same where the white noise of the channels is as large as it is said to be.
     fn of_sensors(&self, fitted: &Self) -> Vec<f64> {
         let slow = (SLOW as f64 * fitted.slow_of_each).min(fitted.bridge_zero.powi(2));
-        let mut out = Vec::with_capacity(self.response.len());
-        for (points, (_, line)) in self.points_of_logs().zip(&self.sampled) {
-            let besides = slow + line.map_or(0.0, |line| line.variance);
-            let sources = self.sources.0.chunks(fitted.factors.len()).skip(points.start).take(points.len());
-            let deviation = |squares: &[f64]| {
-                let of_source = squares.iter().zip(&fitted.factors).map(|(n, a)| n * a.min(1.0));
-                (of_source.sum::<f64>() + besides).sqrt().max(1e-12)
-            };
-            out.extend(sources.map(deviation));
-        }
-        out
+        let deviation = |squares: &[f64]| {
+            let of_source = squares.iter().zip(&fitted.factors).map(|(n, a)| n * a.min(1.0));
+            (of_source.sum::<f64>() + slow).sqrt().max(1e-12)
+        };
+        self.sources.0.chunks(fitted.factors.len()).map(deviation).collect()
     }
 
     /// RMS over the used rows.
@@ -361,25 +351,12 @@ impl Balance {
         let logs = self.rows_of_logs();
         let of_rows = |of: &[f64]| -> Vec<f64> { logs.iter().flatten().map(|i| of[*i]).collect() };
         let lengths: Vec<usize> = logs.iter().map(Vec::len).collect();
-        let without_lines = self.without_lines(&solved.residual);
-        let [residual, deviation] = [&without_lines, &self.deviation].map(|of| of_rows(of));
+        let [residual, deviation] = [&solved.residual, &self.deviation].map(|of| of_rows(of));
         let errors = slow_noise::Errors { residual: &residual, deviation: &deviation, lengths: &lengths };
         let of_each = errors.likeliest_of_decade();
         self.whiten(of_each);
         self.refit_sources(solved);
         self.refit_level(solved, of_each);
-    }
-
-    /// A residual's used rows without what swings with the mains of each log.
-    fn without_lines(&self, residual: &[f64]) -> Vec<f64> {
-        let mut left = vec![0.0; residual.len()];
-        self.used.iter().for_each(|i| left[*i] = residual[*i]);
-        for (points, (step_s, line)) in self.points_of_logs().zip(&self.sampled) {
-            if let Some(line) = line {
-                line.take_off(&mut left[points], *step_s);
-            }
-        }
-        left
     }
 
     /// Takes the size of each guessed source from what a solved set leaves new in each row.
@@ -439,7 +416,6 @@ pub(super) mod tests {
             width: 1.0,
             step_s: 1e-3,
             left_out: vec![false; rows],
-            line: None,
             noise: Box::new(move |_| vec![deviation]),
             guessed: Box::new(|_| Vec::new()),
         }

@@ -8,7 +8,7 @@ use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
 use crate::identify::filters::{gaussian, gradient, local_maximum, rms, shifted, smoothed_flat};
 use crate::identify::grid::Grid;
-use crate::identify::mains::{self, Line};
+use crate::identify::mains;
 use crate::identify::noise;
 use crate::input_error::InputError;
 use crate::predict::BridgeModel;
@@ -40,9 +40,13 @@ pub struct ContactLog {
     pub load_n: Vec<f64>,
     /// Its largest change a sample near by, N.
     pub load_change_n: Vec<f64>,
-    /// Normal force as logged, N.
+    /// Normal force as logged, N: what shows the end of a range.
+    pub logged_n: Vec<f64>,
+    /// Friction torque as logged, N m: what shows the ends of a range.
+    pub logged_nm: Vec<f64>,
+    /// Normal force without what its bridge picks up from the mains, N.
     pub normal_n: Vec<f64>,
-    /// Friction torque as logged, N m.
+    /// Friction torque without what its bridge picks up from the mains, N m.
     pub friction_nm: Vec<f64>,
     /// The same, lightly smoothed: what the slip is observed from.
     pub observed_nm: Vec<f64>,
@@ -70,8 +74,6 @@ pub struct ContactLog {
     pub friction_late: f64,
     /// What the friction channel swings with faster than a model can follow, where samples are regular enough to show it.
     pub ringing: Option<Ringing>,
-    /// What the friction channel picks up from the mains.
-    pub mains: Option<Line>,
 }
 
 /// A channel is at its end within so many deviations of its noise.
@@ -90,10 +92,11 @@ impl ContactLog {
         let optional = |signal| log.signal(signal).map(&on_grid);
         let step_s = grid.step_s;
 
-        let friction_nm = on_grid(signals.friction_torque_nm);
-        let normal_n = on_grid(signals.normal_force_n);
-        let friction_noise_nm = grid.white_noise(&friction_nm, signals.friction_torque_nm);
-        let normal_noise_n = grid.noise(&normal_n, signals.normal_force_n);
+        let logged_nm = on_grid(signals.friction_torque_nm);
+        let logged_n = on_grid(signals.normal_force_n);
+        let friction_noise_nm = grid.white_noise(&logged_nm, signals.friction_torque_nm);
+        let normal_noise_n = grid.noise(&logged_n, signals.normal_force_n);
+        let [friction_nm, normal_n] = [&logged_nm, &logged_n].map(|logged| mains::without(logged, step_s));
 
         let speed_column = log.speed_in_time().map(&on_grid);
         let angle_column = log.signal(Signal::M2Angle).map(|angle| on_grid(&unwrapped(angle)));
@@ -118,7 +121,6 @@ impl ContactLog {
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
-            mains: mains::line(&friction_nm, step_s),
             speed_noise_m_s: radius_m * speed_noise,
             m1_torque_nm: optional(Signal::M1Torque),
             m1_angle_rad: optional(Signal::M1Angle),
@@ -130,6 +132,8 @@ impl ContactLog {
             root_m,
             load_n,
             load_change_n,
+            logged_n,
+            logged_nm,
             normal_n,
             friction_nm,
             smooth_nm,
@@ -174,14 +178,14 @@ impl ContactLog {
     /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.
     pub fn leave_out_ends(&mut self, ends: (f64, f64)) {
         let (low, high) = self.near_ends(ends);
-        let ends = self.friction_nm.iter().map(|x| *x > high || *x < low).collect();
+        let ends = self.logged_nm.iter().map(|x| *x > high || *x < low).collect();
         self.leave_out(ends);
     }
 
     /// Takes out the points at which the normal channel shows its upper end, to which it bends within this width.
     pub fn leave_out_normal_end(&mut self, end_n: f64, knee_n: f64) {
         let near = END_NOISES * knee_n;
-        let ends = self.normal_n.iter().map(|x| *x > end_n - near).collect();
+        let ends = self.logged_n.iter().map(|x| *x > end_n - near).collect();
         self.leave_out(ends);
     }
 

@@ -13,8 +13,8 @@
 //! | transitions | 3 % of the load near a change between slip and stick |
 //!
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
-//! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides. Nor is the channel's 1/f noise
-//! and its mains' line: in a diagnosis residuals and columns go through the filter that makes them white (`whitening.rs`).
+//! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides. Nor is the channel's 1/f
+//! noise: in a diagnosis residuals and columns go through the filter that makes them white (`whitening.rs`).
 
 use std::borrow::Cow;
 
@@ -92,7 +92,7 @@ pub struct Noise {
     factors: [f64; SOURCES],
     /// Variance of slow noise, as fitted.
     slow: f64,
-    /// What is new in each sample beside slow noise and the mains' line; no rows before anything is fitted.
+    /// What is new in each sample beside slow noise; no rows before anything is fitted.
     whitening: Whitening,
 }
 
@@ -207,17 +207,12 @@ impl Noise {
         self.named[sample]
     }
 
-    /// Deviation of each sample from what is named, the mains' line and the slow noise of `fitted`, the noise in logs of the same
-    /// rig. That shows where the tip slides, and is no more than a bridge's zero of this deviation: beyond that it is nothing of a
+    /// Deviation of each sample from what is named and the slow noise of `fitted`, the noise in logs of the same rig. That shows where the tip slides, and is no more than a bridge's zero of this deviation: beyond that it is nothing of a
     /// sensor's.
-    pub fn of_sensors(&self, logs: &[ContactLog], fitted: &Self, slides: &[bool], zero_nm: f64) -> Vec<f64> {
+    pub fn of_sensors(&self, fitted: &Self, slides: &[bool], zero_nm: f64) -> Vec<f64> {
         let slow = fitted.slow.min(zero_nm * zero_nm);
-        let line = logs
-            .iter()
-            .flat_map(|log| std::iter::repeat_n(log.mains.map_or(0.0, |line| line.variance), log.len()));
         let slow = slides.iter().map(|slides| if *slides { slow } else { 0.0 });
-        let besides = line.zip(slow).map(|(line, slow)| line + slow);
-        self.named.iter().zip(besides).map(|(named, besides)| (named * named + besides).sqrt()).collect()
+        self.named.iter().zip(slow).map(|(named, slow)| (named * named + slow).sqrt()).collect()
     }
 
     fn weigh(&mut self, logs: &[ContactLog], factors: &[f64; SOURCES]) {
@@ -313,16 +308,8 @@ impl Noise {
     fn slow_variance(&self, logs: &[ContactLog], r: &[f64], slides: &[bool]) -> f64 {
         let seen = r.iter().zip(&self.deviation).zip(slides);
         // Where a tip sticks, its slip is observed from the force, slow noise and all.
-        let mut residual: Vec<f64> =
+        let residual: Vec<f64> =
             seen.map(|((r, deviation), slides)| if *slides { r * deviation } else { 0.0 }).collect();
-        let mut from = 0;
-        for log in logs {
-            let own = from..from + log.len();
-            from = own.end;
-            if let Some(line) = &log.mains {
-                line.take_off(&mut residual[own], log.grid.step_s);
-            }
-        }
         let lengths: Vec<usize> = logs.iter().map(ContactLog::len).collect();
         Errors { residual: &residual, deviation: &self.deviation, lengths: &lengths }.likeliest_of_decade()
     }
@@ -339,11 +326,7 @@ impl Noise {
         let rows = |log: &ContactLog| {
             let own = from..from + log.len();
             from = own.end;
-            LogPoints {
-                points: own.filter(|i| r[*i] != 0.0).collect(),
-                step_s: log.grid.step_s,
-                line: log.mains,
-            }
+            LogPoints { points: own.filter(|i| r[*i] != 0.0).collect(), step_s: log.grid.step_s }
         };
         let rows: Vec<LogPoints> = logs.iter().map(rows).collect();
         self.whitening = Whitening::new(&rows, &self.deviation, |i| slides[i], of_each);

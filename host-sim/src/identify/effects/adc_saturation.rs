@@ -97,7 +97,7 @@ impl AdcSaturation {
         let noise = view.logs.iter().map(|log| log.friction_noise_nm).fold(1e-9, f64::max);
         let found = [-1.0, 1.0].map(|sign| {
             let logs: Vec<Vec<f64>> =
-                view.logs.iter().map(|log| log.friction_nm.iter().map(|x| sign * x).collect()).collect();
+                view.logs.iter().map(|log| log.logged_nm.iter().map(|x| sign * x).collect()).collect();
             Some(sign * end(&logs, noise)?)
         });
         self.of_ends(scale, found).into_iter().collect()
@@ -135,7 +135,7 @@ impl AdcSaturation {
         let scale = view.scales.load_n;
         let noise = view.logs.iter().map(|log| log.normal_noise_n).fold(1e-9, f64::max);
         let (high, [gain, offset]) = if view.training {
-            let high = end(&view.logs.iter().map(|log| log.normal_n.clone()).collect::<Vec<_>>(), noise)?;
+            let high = end(&view.logs.iter().map(|log| log.logged_n.clone()).collect::<Vec<_>>(), noise)?;
             let below = |n: f64| n > TOUCHING * scale && n < high - END_NOISES * noise;
             let points = view.logs.iter().zip(&torque).flat_map(|(log, t)| log.load_n.iter().zip(t).filter(|(n, _)| below(**n)));
             let (n, t): (Vec<f64>, Vec<f64>) = points.map(|(n, t)| (n / scale, *t)).unzip();
