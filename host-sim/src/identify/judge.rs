@@ -13,7 +13,7 @@ use super::filters::rms;
 use super::law_form::LAW_FORM;
 use super::linear_part::{self, Linear};
 use super::normal_load::NormalLoadLog;
-use super::rest::{self, BEYOND_FORM, Rest};
+use super::rest::{self, BEYOND_FORM, LeftByContact, Rest};
 use super::table::{Candidate, Hypothesis, Part, TooSmall, real, table};
 use crate::files::log::{Log, LogKind};
 use crate::files::model_file::ModelFile;
@@ -415,16 +415,24 @@ impl Judgement {
     }
 
     fn rests_of(&self, hypothesis: &Hypothesis) -> Rests {
-        let mut out = Vec::new();
-        if let (Some(contact), Some(place)) = (&self.contact, hypothesis.place(Part::Friction)) {
-            let disc_cause = contact.disc_cause.as_ref().filter(|c| hypothesis.effects.contains(&c.effect));
-            out.push((Part::Friction, rest::of_contact(contact, place, disc_cause)));
-        }
-        for (part, linear) in [(Part::Drive, &self.drive), (Part::Pressure, &self.normal_load)] {
-            if let (Some(linear), Some(place)) = (linear, hypothesis.place(part)) {
-                out.push((part, linear.rest(place)));
-            }
-        }
+        let place = |part| hypothesis.place(part);
+        let mut contact = self
+            .contact
+            .as_ref()
+            .zip(place(Part::Friction))
+            .map(|(contact, place)| LeftByContact::new(contact, place));
+        let drive = self.drive.as_ref().zip(place(Part::Drive));
+        let of_bridge = contact.as_mut().zip(drive).map_or(0.0, |(contact, (drive, place))| {
+            contact.shared_with(&drive.balance, &drive.solved[place].residual)
+        });
+        let contact = contact.map(|left| {
+            let disc_cause = self.contact.as_ref().and_then(|contact| contact.disc_cause.as_ref());
+            (Part::Friction, left.rest(disc_cause.filter(|c| hypothesis.effects.contains(&c.effect))))
+        });
+        let drive = drive.map(|(drive, place)| (Part::Drive, drive.rest(place, of_bridge)));
+        let normal_load = self.normal_load.as_ref().zip(place(Part::Pressure));
+        let pressure = normal_load.map(|(linear, place)| (Part::Pressure, linear.rest(place, 0.0)));
+        let mut out: Rests = [contact, drive, pressure].into_iter().flatten().collect();
         // What is left where nothing acts is weighed against what is explained elsewhere.
         let most = out.iter().map(|(_, rest)| rest.explained).fold(0.0, f64::max);
         out.iter_mut().filter(|(_, rest)| rest.explained == 0.0).for_each(|(_, rest)| rest.elsewhere = most);

@@ -149,8 +149,8 @@ impl Linear {
         forms.filter(|form| form.is_of_each_log()).map(|form| form.effect).collect()
     }
 
-    /// What a set leaves.
-    pub fn rest(&self, place: usize) -> Rest {
+    /// What a set leaves, where slow noise of the friction bridge makes this variance of a block's mean.
+    pub fn rest(&self, place: usize, of_bridge: f64) -> Rest {
         let none = self.solved.iter().find(|s| s.set.is_empty());
         let solved = &self.solved[place];
         rest::of_balance(
@@ -158,6 +158,7 @@ impl Linear {
             &solved.residual,
             none.map(|s| s.residual.as_slice()),
             solved.set.len(),
+            of_bridge,
             &self.coordinates,
         )
     }

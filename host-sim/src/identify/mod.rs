@@ -1,6 +1,7 @@
 //! Identification and diagnosis: one likelihood for each balance of the rig, one table of causes.
 
 pub mod balance;
+mod bridge_noise;
 mod bridge_zero;
 pub mod command;
 mod component;

@@ -1,6 +1,7 @@
 //! What is left after the best hypothesis: how large, how far beyond noise, what it follows.
 
 use super::balance::Balance;
+use super::bridge_noise::{self, Left};
 use super::contact::change::Bridge;
 use super::contact::channel::before_ringing;
 use super::contact::log::ContactLog;
@@ -137,8 +138,8 @@ impl Noise {
     }
 }
 
-/// Mean squares of means over blocks, less what noise leaves of them.
-fn structured(residual: &[f64], noise: &Noise, rows: &[usize], block: usize) -> (f64, f64) {
+/// Mean squares of means over blocks, less what noise leaves of them, which has so much of the bridge's slow noise.
+fn structured(residual: &[f64], noise: &Noise, rows: &[usize], block: usize, of_bridge: f64) -> (f64, f64) {
     let (mut sum, mut left, mut count) = (0.0, 0.0, 0.0f64);
     for chunk in rows.chunks(block) {
         if chunk.len() * 2 < block {
@@ -151,7 +152,8 @@ fn structured(residual: &[f64], noise: &Noise, rows: &[usize], block: usize) -> 
         count += 1.0;
     }
     let count = count.max(1.0);
-    ((sum / count - left / count).max(0.0), left / count)
+    let left = left / count + of_bridge;
+    ((sum / count - left).max(0.0), left)
 }
 
 /// Samples in the blocks, the longest first.
@@ -172,6 +174,8 @@ pub struct Ground {
     rows: Vec<usize>,
     /// Samples in the blocks.
     blocks: [usize; 2],
+    /// Variance of a block's mean that slow noise of the friction bridge leaves, as far as the drive shows it too.
+    of_bridge: [f64; 2],
     /// RMS of the channel, N m.
     signal: f64,
     /// Deviations of the zeros of friction bridge and normal bridge, relative to what they usually show.
@@ -201,6 +205,7 @@ impl Ground {
             noise: Noise { repeated: if dense { repeated.collect() } else { Vec::new() }, white },
             signal,
             blocks: blocks(step_s),
+            of_bridge: [0.0; 2],
             classes: [
                 problem.baseline.deviation_of(Role::FrictionZero) / signal,
                 problem.baseline.deviation_of(Role::NormalZero) / load_n,
@@ -221,8 +226,11 @@ impl Ground {
 
     /// The same beyond this noise of blocks.
     fn beyond(&self, noise: &Noise, residual: &[f64]) -> (f64, f64) {
-        let [long, short] = self.blocks.map(|block| structured(residual, noise, &self.rows, block));
-        let each = self.of_sample.as_ref().map(|noise| structured(residual, noise, &self.rows, 1));
+        let of = |noise: &Noise, block: usize, of_bridge| {
+            structured(residual, noise, &self.rows, block, of_bridge)
+        };
+        let [long, short] = [0, 1].map(|at| of(noise, self.blocks[at], self.of_bridge[at]));
+        let each = self.of_sample.as_ref().map(|noise| of(noise, 1, self.of_bridge[1]));
         [short].into_iter().chain(each).fold(long, |most, other| if other.0 > most.0 { other } else { most })
     }
 
@@ -264,40 +272,78 @@ pub fn nothing_is_known(contact: &ContactPart) -> bool {
     Ground::new(&contact.problem(), &contact.ranked[0].fit).rows.is_empty()
 }
 
-/// Of the contact's balance; `disc_cause` where the hypothesis has it.
-pub fn of_contact(contact: &ContactPart, place: usize, disc_cause: Option<&DiscCause>) -> Rest {
-    let problem = contact.problem();
-    let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit.r);
-    let fit = contact.fit(place);
-    let as_logged = disc_cause.map(|cause| {
-        let over = cause.residual_nm.iter().zip(&problem.noise.deviation).zip(&fit.r);
-        over.map(|((r, s), used)| if *used == 0.0 { 0.0 } else { r / s }).collect::<Vec<f64>>()
-    });
-    let mut explained: Vec<f64> = contact.contributions[place].iter().map(|own| own.size).collect();
-    if let (Some(as_logged), Some(none)) = (&as_logged, none) {
-        explained.push(search::difference(&problem, none, as_logged));
+/// What a set of the contact leaves.
+pub struct LeftByContact<'c> {
+    contact: &'c ContactPart,
+    place: usize,
+    ground: Ground,
+    residual_nm: Vec<f64>,
+}
+
+impl<'c> LeftByContact<'c> {
+    /// The set at this place.
+    pub fn new(contact: &'c ContactPart, place: usize) -> Self {
+        let problem = contact.problem();
+        let ground = Ground::new(&problem, &contact.ranked[0].fit);
+        let residual_nm = ground.left(&problem, contact.fit(place));
+        Self { contact, place, ground, residual_nm }
     }
-    let ground = Ground::new(&problem, &contact.ranked[0].fit);
-    let residual = ground.left(&problem, fit);
-    if ground.rows.is_empty() {
-        // What cannot be looked at is not explained.
-        return Rest { size: 1.0, share: 1.0, ..Rest::default() };
+
+    /// Takes as noise what the drive leaves alike of the friction bridge's error, and returns the variance of a block's mean that
+    /// it leaves in the drive.
+    pub fn shared_with(&mut self, drive: &Balance, residual: &[f64]) -> f64 {
+        let slides = self.contact.problem().slides(self.contact.fit(self.place));
+        let starts: Vec<usize> = drive.starts.clone();
+        let white = rms(&self.ground.noise.white).powi(2);
+        let left = [
+            Left { residual: &self.residual_nm, rows: &self.ground.rows },
+            Left { residual, rows: &drive.used },
+        ];
+        let shared = |block: usize, counts: &dyn Fn(usize) -> bool| {
+            bridge_noise::variance_of_mean(left, &starts, block, white, counts)
+        };
+        let blocks = self.ground.blocks;
+        // Where the tip sticks its slip is observed from the force, the bridge's error and all.
+        let of_drive = shared(blocks[0], &|i| slides[i]);
+        self.ground.of_bridge = blocks.map(|block| shared(block, &|_| true));
+        of_drive
     }
-    let (rest, left) = ground.structured(&residual);
-    let before = as_logged.as_ref().or(none).map_or(rest, |none| ground.structured(&ground.in_units(none)).0);
-    Rest {
-        size: rest.sqrt() / ground.signal,
-        share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
-        explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
-        elsewhere: 0.0,
-        times_noise: rest / left.max(1e-300),
-        further_causes: 0,
-        follows: if rest > 0.0 {
-            follows(&residual, &ground.rows, ground.blocks[0], &contact_quantities(contact))
-        } else {
-            // Of what noise leaves nothing can be said to follow.
-            Vec::new()
-        },
+
+    /// How large it is; `disc_cause` where the hypothesis has it.
+    pub fn rest(&self, disc_cause: Option<&DiscCause>) -> Rest {
+        let Self { contact, place, ground, residual_nm } = self;
+        let problem = contact.problem();
+        let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit.r);
+        let fit = contact.fit(*place);
+        let as_logged = disc_cause.map(|cause| {
+            let over = cause.residual_nm.iter().zip(&problem.noise.deviation).zip(&fit.r);
+            over.map(|((r, s), used)| if *used == 0.0 { 0.0 } else { r / s }).collect::<Vec<f64>>()
+        });
+        let mut explained: Vec<f64> = contact.contributions[*place].iter().map(|own| own.size).collect();
+        if let (Some(as_logged), Some(none)) = (&as_logged, none) {
+            explained.push(search::difference(&problem, none, as_logged));
+        }
+        if ground.rows.is_empty() {
+            // What cannot be looked at is not explained.
+            return Rest { size: 1.0, share: 1.0, ..Rest::default() };
+        }
+        let (rest, left) = ground.structured(residual_nm);
+        let before =
+            as_logged.as_ref().or(none).map_or(rest, |none| ground.structured(&ground.in_units(none)).0);
+        Rest {
+            size: rest.sqrt() / ground.signal,
+            share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
+            explained: explained.into_iter().reduce(f64::min).unwrap_or(0.0),
+            elsewhere: 0.0,
+            times_noise: rest / left.max(1e-300),
+            further_causes: 0,
+            follows: if rest > 0.0 {
+                follows(residual_nm, &ground.rows, ground.blocks[0], &contact_quantities(contact))
+            } else {
+                // Of what noise leaves nothing can be said to follow.
+                Vec::new()
+            },
+        }
     }
 }
 
@@ -369,7 +415,7 @@ fn follows(
 pub fn contribution(balance: &Balance, effect: &str, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
     let noise = Noise::white(balance.first_deviation.clone());
-    let left = structured(residual, &noise, &balance.used, block).0.sqrt();
+    let left = structured(residual, &noise, &balance.used, block, 0.0).0.sqrt();
     let change = balance.difference(residual, without);
     let scale = balance.scale.max(1e-12);
     let of_bridge = effects::with_id(effect).is_some_and(|effect| effect.is_like_a_bridges_error());
@@ -380,20 +426,22 @@ pub fn contribution(balance: &Balance, effect: &str, residual: &[f64], without: 
     }
 }
 
-/// Of a linear balance with so many causes. Its columns do not imitate each other as laws of friction do: what the whole set
-/// explains counts.
+/// Of a linear balance with so many causes, of whose block means slow noise of the friction bridge makes this variance. Its columns
+/// do not imitate each other as laws of friction do: what the whole set explains counts.
 pub fn of_balance(
     balance: &Balance,
     residual: &[f64],
     none: Option<&[f64]>,
     causes: usize,
+    of_bridge: f64,
     coordinates: &[(String, Vec<f64>)],
 ) -> Rest {
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
     let noise = Noise::white(balance.first_deviation.clone());
-    let (rest, left) = structured(residual, &noise, &balance.used, block);
-    let before = none.map_or(rest, |none| structured(none, &noise, &balance.used, block).0);
+    let of = |residual: &[f64]| structured(residual, &noise, &balance.used, block, of_bridge);
+    let (rest, left) = of(residual);
+    let before = none.map_or(rest, |none| of(none).0);
     Rest {
         size: rest.sqrt() / balance.scale.max(1e-12),
         share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
@@ -422,10 +470,11 @@ mod tests {
         let rows: Vec<usize> = (0..100).collect();
         let mut noise = Noise { white: vec![0.3; 100], repeated: vec![0.04; 100] };
         let residual = vec![0.5; 100];
-        let (rest, left) = structured(&residual, &noise, &rows, 50);
+        let (rest, left) = structured(&residual, &noise, &rows, 50, 0.0);
         assert!((left - (0.09 / 50.0 + 0.04)).abs() < 1e-12 && (rest - (0.25 - left)).abs() < 1e-12);
         noise.repeated.clear();
-        assert!((structured(&residual, &noise, &rows, 50).1 - 0.09 / 50.0).abs() < 1e-12);
+        let (rest, left) = structured(&residual, &noise, &rows, 50, 0.1);
+        assert!((left - (0.09 / 50.0 + 0.1)).abs() < 1e-12 && (rest - (0.25 - left)).abs() < 1e-12);
     }
 
     #[test]
