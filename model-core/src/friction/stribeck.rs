@@ -1,7 +1,7 @@
 //! The Stribeck curve, eq. 13: g(v) = θ (a0 + a1 exp(−(|v|/v0)^δ)).
 //!
-//! The paper has δ = 0.5; 2 is usual elsewhere, so δ is a parameter, limited to [0.25, 2]. With
-//! δ < 1 the slope g′ is infinite at v = 0, but v·g′(v) is finite everywhere, so solvers use that.
+//! The paper has δ = 0.5; 0.5 to 1, 2 and far more have been fitted elsewhere (Armstrong-Hélouvry, Dupont and
+//! Canudas de Wit 1994, section 2.1), so δ is a parameter, limited to [0.1, 4]. With δ < 1 the slope g′ is infinite at v = 0, but v·g′(v) is finite everywhere, so solvers use that.
 //! Monotonically falling by construction; the measured bell (Fig. 27) is in [`super::static_curve`].
 
 use crate::error::{ParameterError, require};
@@ -16,7 +16,7 @@ pub struct StribeckParameters<T> {
     pub a1: T,
     /// Stribeck speed v0, m/s, > 0.
     pub v0_m_s: T,
-    /// Exponent δ, 0.25 to 2.
+    /// Exponent δ, 0.1 to 4.
     pub delta: T,
     /// Road factor θ, > 0.
     pub theta: T,
@@ -47,8 +47,8 @@ impl<T: Real> Stribeck<T> {
         let a1 = require("a1", p.a1, p.a1 >= T::ZERO && p.a1 <= T::from_f64(10.0), "0 <= a1 <= 10")?;
         let v0_allowed = p.v0_m_s >= T::from_f64(1e-6) && p.v0_m_s <= T::from_f64(100.0);
         let v0 = require("v0_m_s", p.v0_m_s, v0_allowed, "1e-6 to 100 m/s")?;
-        let delta_allowed = p.delta >= T::from_f64(0.25) && p.delta <= T::from_f64(2.0);
-        let delta = require("delta", p.delta, delta_allowed, "0.25 to 2")?;
+        let delta_allowed = p.delta >= T::from_f64(0.1) && p.delta <= T::from_f64(4.0);
+        let delta = require("delta", p.delta, delta_allowed, "0.1 to 4")?;
         let theta_allowed = p.theta > T::ZERO && p.theta <= T::from_f64(10.0);
         let theta = require("theta", p.theta, theta_allowed, "0 < theta <= 10")?;
         let exponent = if delta == T::HALF {
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn every_exponent_has_the_slope_of_its_difference_quotient() {
-        for delta in [0.25, 0.5, 0.7, 1.0, 1.5, 2.0] {
+        for delta in [0.1, 0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0] {
             let g = Stribeck::new(&StribeckParameters { delta, ..parameters() }).unwrap();
             for v in [1e-3, 0.02, 0.4, 3.0] {
                 let h = v * 1e-6;
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn the_bound_for_a_rising_momentum_is_the_one_found_by_search() {
-        for delta in [0.5, 1.0, 2.0] {
+        for delta in [0.5, 1.0, 2.0, 4.0] {
             let bound = delta * (-(1.0f64 + 1.0 / delta)).exp();
             for (a0, expected) in [(bound * 1.01, true), (bound * 0.99, false)] {
                 let g = Stribeck::new(&StribeckParameters { a0, a1: 1.0, delta, ..parameters() }).unwrap();
@@ -164,7 +164,8 @@ mod tests {
             (StribeckParameters { a0: 0.0, ..p }, "a0"),
             (StribeckParameters { a1: -0.1, ..p }, "a1"),
             (StribeckParameters { v0_m_s: -1.0, ..p }, "v0_m_s"),
-            (StribeckParameters { delta: 0.0, ..p }, "delta"),
+            (StribeckParameters { delta: 0.05, ..p }, "delta"),
+            (StribeckParameters { delta: 4.1, ..p }, "delta"),
             (StribeckParameters { theta: f64::NAN, ..p }, "theta"),
         ] {
             let error = Stribeck::new(&bad).unwrap_err();

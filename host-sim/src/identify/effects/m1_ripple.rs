@@ -4,8 +4,8 @@
 //! two are one, and a law over them is a law of the spring force: then nothing parts them. Columns as those of M2's ripple.
 
 use super::joint_waves::{Candidates, Joint};
-use super::waves::{self, Waves};
-use super::{About, Effect, NormalLoadView, fixed_orders};
+use super::waves::{self, Wave, Waves};
+use super::{About, Effect, NormalLoadView};
 use crate::identify::balance::Alternative;
 
 /// The effect.
@@ -38,6 +38,7 @@ impl Effect for M1Ripple {
             let make = Waves {
                 effect: self.id(),
                 positions: &positions,
+                efforts: &[],
                 filtered: &|at, values| view.logs[at].filtered(values),
                 size: 0.5 * view.scales.torque_nm,
                 rotary: over == "angle",
@@ -45,7 +46,7 @@ impl Effect for M1Ripple {
             if let Some(fixed) = view.fixed {
                 let wanted = fixed.iter().any(|(name, _)| name.starts_with("wavelength")) == (over == "force");
                 if wanted {
-                    all.extend(make.alternatives(&fixed_orders(fixed), 1));
+                    all.extend(make.alternatives(&waves::fixed(fixed), 1));
                 }
                 continue;
             }
@@ -62,7 +63,8 @@ impl Effect for M1Ripple {
                 let orders = searched.orders(&candidates, MOST_ORDERS);
                 for (own_phase, joint) in joints.iter().filter(|(own_phase, _)| *apart || !own_phase) {
                     for count in 1..=orders.len() {
-                        let orders = joint.sharpened(&orders[..count], &candidates);
+                        let sharpened = joint.sharpened(&orders[..count], &candidates);
+                        let orders: Vec<Wave> = sharpened.into_iter().map(Wave::steady).collect();
                         all.push(make.alternative(&orders, candidates.count(), *own_phase));
                     }
                 }

@@ -1,11 +1,14 @@
 //! `m2_ripple`: M2's torque ripples with its angle (cogging orders).
 //!
 //! Coordinate: angle, or position of a stage. Columns: the orders at which what the base leaves has lines; one phase for all
-//! logs, or one for each, since an incremental encoder has its zero where it was switched on.
+//! logs, or one for each, since an incremental encoder has its zero where it was switched on. Cogging, and an offset of a current,
+//! ripple alike at every torque; what the windings' field or the gain of a current's sensor does is in proportion to it (Jahns and
+//! Soong 1996).
 
 use super::waves::{self, Waves};
-use super::{About, DriveView, Effect, fixed_orders};
+use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
+use crate::identify::drive::DriveLog;
 use crate::identify::filters::gaussian;
 
 /// The effect.
@@ -17,6 +20,8 @@ const HIGHEST_ORDER: usize = 240;
 const MOST_PERIODS: usize = 120;
 /// Most orders at once.
 const MOST_ORDERS: usize = 8;
+/// A wave's amplitude is steady, or in proportion to the torque.
+const KINDS: usize = 2;
 /// A line's power over the median of all: of white noise the largest of 240 is 8 times it, coloured noise has more.
 const OVER_MEDIAN: f64 = 25.0;
 
@@ -31,17 +36,21 @@ impl Effect for M2Ripple {
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let positions: Vec<&[f64]> = view.logs.iter().map(|log| log.position.as_slice()).collect();
+        let relative = |log: &DriveLog| log.effort.iter().map(|effort| effort / view.scales.effort).collect();
+        let efforts: Vec<Vec<f64>> = view.logs.iter().map(relative).collect();
         let make = Waves {
             effect: self.id(),
             positions: &positions,
+            efforts: &efforts,
             filtered: &|at, values| view.logs[at].filtered(values),
             size: view.scales.own,
             rotary: view.rotary,
         };
         if let Some(fixed) = view.fixed {
-            return make.alternatives(&fixed_orders(fixed), 1);
+            return make.alternatives(&waves::fixed(fixed), 1);
         }
-        let (x, r) = waves::picked(view.balance, &positions.concat(), view.company.residual);
+        let [x, r, effort] = [&positions.concat(), view.company.residual, &efforts.concat()]
+            .map(|values| waves::picked(view.balance, values));
         let candidates: Vec<f64> = if view.rotary {
             // A wave must not turn by more than a third of its period from row to row.
             let fastest = view.scales.speed * view.balance.row_step_s;
@@ -49,10 +58,10 @@ impl Effect for M2Ripple {
         } else {
             waves::of_travel(x.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max), MOST_PERIODS)
         };
-        let found = waves::lines(&x, &r, &candidates, MOST_ORDERS, OVER_MEDIAN);
+        let found = waves::lines(&x, &r, &effort, &candidates, MOST_ORDERS, OVER_MEDIAN);
         let counts = [1, 2, 4, MOST_ORDERS].into_iter().filter(|count| *count < 2 * found.len().max(1));
         let mut all: Vec<Alternative> =
-            counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], candidates.len())).collect();
+            counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], KINDS * candidates.len())).collect();
         // A compensated motor has the ripple in its torque and not in its motion: both are told.
         // Through a filter that lets ripples pass, at all samples: a motor that cogs stands still at times.
         let speed: Vec<Vec<f64>> = view
@@ -61,8 +70,8 @@ impl Effect for M2Ripple {
             .map(|log| gaussian(&log.position, 1.0, 1).iter().map(|d| d / log.grid.step_s).collect())
             .collect();
         for alternative in &mut all {
-            let orders = fixed_orders(&alternative.constants);
-            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&positions, &speed, *k)));
+            let orders = waves::fixed(&alternative.constants);
+            let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&positions, &speed, k.number)));
             alternative.constants.extend(sizes);
         }
         all

@@ -58,18 +58,6 @@ pub(super) fn shapes(fixed: Option<&[(String, f64)]>, name: &str, grid: Vec<f64>
     given.map_or(grid, |value| vec![value])
 }
 
-/// The wave numbers of a shape found on other logs.
-pub(super) fn fixed_orders(fixed: &[(String, f64)]) -> Vec<f64> {
-    fixed
-        .iter()
-        .filter_map(|(name, value)| {
-            let length = name.starts_with("wavelength");
-            (length || name.starts_with("order"))
-                .then(|| if length { std::f64::consts::TAU / value } else { *value })
-        })
-        .collect()
-}
-
 /// The logs of a normal-load actuator, and what columns are made from.
 pub struct NormalLoadView<'a> {
     /// Logs.
