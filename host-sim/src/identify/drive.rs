@@ -8,7 +8,9 @@
 use super::balance::{Alternative, Balance, LogRows};
 use super::contact::log::ContactLog;
 use super::effects::coordinates::TIME;
-use super::filters::{adaptively_smoothed, gaussian, largest_change, local_maximum, rms, steps, white_share};
+use super::filters::{
+    self, WIDEST_MEAN, adaptively_smoothed, gaussian, largest_change, local_maximum, rms, steps, white_share,
+};
 use super::grid::Grid;
 use super::noise;
 use super::term::Parameter;
@@ -51,6 +53,8 @@ pub const COULOMB: usize = 1;
 const VISCOUS: usize = 2;
 /// Where the errors of the channels begin.
 const SENSORS: usize = 3;
+/// Which of them is the share of the bridge's noise that is left out.
+const NOISE_SHARE: &str = "friction_noise_share";
 
 /// Signals of a drive.
 #[derive(Debug, Clone)]
@@ -103,7 +107,7 @@ impl DriveLog {
     /// The drive of a contact log; `None` where its torque is not logged.
     pub fn of_contact(log: &ContactLog, inertia: f64) -> Option<Self> {
         let effort = log.m2_torque_nm.clone()?;
-        let friction = super::filters::shifted(&log.friction_nm, log.friction_late);
+        let friction = filters::shifted(&log.friction_nm, log.friction_late);
         let load = Some(log.load_n.clone());
         let (grid, usable) = (log.grid.clone(), log.usable.clone());
         Some(Self::made(
@@ -391,14 +395,15 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
             let of_bridge = log.friction_noise.iter().flatten().map(|noise| -noise);
             log.filtered(&of_bridge.collect::<Vec<f64>>())
         };
-        base.push((wide("friction_noise_share", 0.0, 1.0), concat(&noise)));
+        base.push((wide(NOISE_SHARE, 0.0, 1.0), concat(&noise)));
     }
     if let Some(deviation) = prior.bridge_zero {
         base.push((wide("friction_zero", 0.0, deviation), concat(&|log| vec![-1.0; log.len()])));
     }
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, contact, scales)).collect();
     let balance = Balance::new(concat(&response), base, &rows, scales.effort)
-        .with_sensors(SENSORS, prior.bridge_zero.unwrap_or(0.0));
+        .with_sensors(SENSORS, prior.bridge_zero.unwrap_or(0.0))
+        .without_noise_of(NOISE_SHARE);
     // A drive alone is looked at for its ripple.
     if contact { balance } else { balance.without_rests() }
 }
@@ -413,14 +418,27 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let swings = steps(&log.effort, log.width);
     let friction_swings = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| steps(f, log.width));
     let folded = BETWEEN_SAMPLES * white_share(log.width);
-    let white = deviation_of(contact, &log.effort)
-        .hypot(log.friction.as_ref().map_or(0.0, |f| deviation_of(contact, f)));
-    let (white, form) = (white * white_share(log.width), LEAST_NOISE * scales.own);
-    let noise = move |_| vec![white, log.inertial_noise, form];
+    let white = |values: &[f64]| deviation_of(contact, values) * white_share(log.width);
+    let of_effort = white(&log.effort);
+    let of_bridge = log.friction.as_ref().map_or(0.0, |friction| white(friction));
+    // Where the torque rests the base may leave the bridge's noise out: how much of it is then in a row the residuals tell, between
+    // all of it and what its means have.
+    let in_means = (white_share(WIDEST_MEAN) / white_share(log.width)).min(1.0).powi(2);
+    let rests = log.friction_noise.as_ref().map_or_else(
+        || vec![false; log.len()],
+        |noise| {
+            let moves: Vec<f64> = noise.iter().map(|noise| f64::from(u8::from(*noise == 0.0))).collect();
+            let reach = (filters::REACH * log.width).ceil() as usize;
+            local_maximum(&moves, reach).into_iter().map(|moves| moves == 0.0).collect()
+        },
+    );
+    let (rest, form) = (rests.clone(), LEAST_NOISE * scales.own);
+    let noise =
+        move |i: usize| vec![of_effort, if rest[i] { 0.0 } else { of_bridge }, log.inertial_noise, form];
     let guessed = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
         let folded = folded * swings[i].hypot(friction_swings[i]);
-        vec![between.0, between.1, folded]
+        vec![between.0, between.1, folded, if rests[i] { of_bridge } else { 0.0 }]
     };
     // What the derivative of a Gaussian lets through of white noise.
     let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
@@ -433,6 +451,7 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
         left_out,
         noise: Box::new(noise),
         guessed: Box::new(guessed),
+        least: vec![in_means],
     }
 }
 
@@ -479,6 +498,36 @@ mod tests {
             "{of_effort} {of_acceleration}"
         );
         assert!(passed(&log.acceleration, 2e-3 * omega * omega) < 0.6);
+    }
+
+    #[test]
+    fn a_noisy_bridge_is_a_quiet_one_where_its_torque_rests() {
+        // The torque rests in the first half and swings in the second.
+        const COUNT: usize = 8000;
+        const BRIDGE_NM: f64 = 0.1;
+        let time: Vec<f64> = (0..COUNT).map(|i| 1e-3 * i as f64).collect();
+        let [of_motor, of_bridge] = [3, 4].map(|seed| noise::tests::white(COUNT, seed));
+        let torque: Vec<f64> =
+            time.iter().map(|t| if *t < 4.0 { 2.0 } else { 2.0 + (9.0 * t).sin() }).collect();
+        let effort = torque.iter().zip(&of_motor).map(|(t, n)| t + 0.003 * n).collect();
+        let friction: Vec<f64> = torque.iter().zip(&of_bridge).map(|(t, n)| t + BRIDGE_NM * n).collect();
+        let position = time.iter().map(|t| -12.0 * (0.5 * t).cos()).collect();
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        let load = Some(vec![80.0; COUNT]);
+        let log = DriveLog::made("log".into(), grid, effort, position, Some(friction), load, usable, 0.02);
+        let logs = [log];
+        let mut balance = balance(&logs, &DrivePrior::default(), &DriveScales::new(&logs));
+        let solved = balance.solve(&[], &[]);
+        balance.refit_noise(&solved);
+        let of = |range: std::ops::Range<usize>| rms(&balance.deviation[range]);
+        let [rests, swings] = [of(500..3500), of(4500..6000)];
+        let of_bridge = BRIDGE_NM * white_share(logs[0].width);
+        // Of means over 32 samples' width a third as much is left as behind the filter.
+        assert!(
+            rests < 0.5 * of_bridge && (0.9..1.5).contains(&(swings / of_bridge)),
+            "{rests} {swings} {of_bridge}"
+        );
     }
 
     /// Evidence that a soft shaft gains where there is none, by what it takes off what the bridge shows beside this torque.

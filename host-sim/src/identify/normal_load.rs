@@ -211,7 +211,14 @@ fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> Log
     let guessed = move |i: usize| vec![BETWEEN_SAMPLES * change[i], BEND * bend[i] / gain];
     let touching = TOUCHING * scales.load_n;
     let left_out = log.filtered_n.iter().zip(&log.usable).map(|(n, used)| *n < touching || !used).collect();
-    LogRows { width: WIDTH, step_s: log.step_s, left_out, noise: Box::new(noise), guessed: Box::new(guessed) }
+    LogRows {
+        width: WIDTH,
+        step_s: log.step_s,
+        left_out,
+        noise: Box::new(noise),
+        guessed: Box::new(guessed),
+        least: Vec::new(),
+    }
 }
 
 #[cfg(test)]
