@@ -20,8 +20,6 @@ const HIGHEST_ORDER: usize = 240;
 const MOST_PERIODS: usize = 120;
 /// Most orders at once.
 const MOST_ORDERS: usize = 8;
-/// A wave's amplitude is steady, or in proportion to the torque.
-const KINDS: usize = 2;
 /// A line's power over the median of all: of white noise the largest of 240 is 8 times it, coloured noise has more.
 const OVER_MEDIAN: f64 = 25.0;
 
@@ -37,7 +35,11 @@ impl Effect for M2Ripple {
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
         let positions: Vec<&[f64]> = view.logs.iter().map(|log| log.position.as_slice()).collect();
         let relative = |log: &DriveLog| log.effort.iter().map(|effort| effort / view.scales.effort).collect();
-        let efforts: Vec<Vec<f64>> = view.logs.iter().map(relative).collect();
+        // Over a stage's travel a force that drags more in some places than in others is as much in proportion to the effort.
+        let efforts: Vec<Vec<f64>> =
+            if view.rotary { view.logs.iter().map(relative).collect() } else { Vec::new() };
+        // A wave's amplitude is steady, or in proportion to the torque.
+        let kinds = if efforts.is_empty() { 1 } else { 2 };
         let make = Waves {
             effect: self.id(),
             positions: &positions,
@@ -49,8 +51,9 @@ impl Effect for M2Ripple {
         if let Some(fixed) = view.fixed {
             return make.alternatives(&waves::fixed(fixed), 1);
         }
-        let [x, r, effort] = [&positions.concat(), view.company.residual, &efforts.concat()]
-            .map(|values| waves::picked(view.balance, values));
+        let picked = |values: &[f64]| waves::picked(view.balance, values);
+        let (x, r) = (picked(&positions.concat()), picked(view.company.residual));
+        let effort = if efforts.is_empty() { Vec::new() } else { picked(&efforts.concat()) };
         let candidates: Vec<f64> = if view.rotary {
             // A wave must not turn by more than a third of its period from row to row.
             let fastest = view.scales.speed * view.balance.row_step_s;
@@ -61,7 +64,7 @@ impl Effect for M2Ripple {
         let found = waves::lines(&x, &r, &effort, &candidates, MOST_ORDERS, OVER_MEDIAN);
         let counts = [1, 2, 4, MOST_ORDERS].into_iter().filter(|count| *count < 2 * found.len().max(1));
         let mut all: Vec<Alternative> =
-            counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], KINDS * candidates.len())).collect();
+            counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], kinds * candidates.len())).collect();
         // A compensated motor has the ripple in its torque and not in its motion: both are told.
         // Through a filter that lets ripples pass, at all samples: a motor that cogs stands still at times.
         let speed: Vec<Vec<f64>> = view
