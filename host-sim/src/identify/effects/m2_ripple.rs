@@ -38,8 +38,6 @@ impl Effect for M2Ripple {
         // Over a stage's travel a force that drags more in some places than in others is as much in proportion to the effort.
         let efforts: Vec<Vec<f64>> =
             if view.rotary { view.logs.iter().map(relative).collect() } else { Vec::new() };
-        // A wave's amplitude is steady, or in proportion to the torque.
-        let kinds = if efforts.is_empty() { 1 } else { 2 };
         let make = Waves {
             effect: self.id(),
             positions: &positions,
@@ -61,10 +59,17 @@ impl Effect for M2Ripple {
         } else {
             waves::of_travel(x.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max), MOST_PERIODS)
         };
-        let found = waves::lines(&x, &r, &effort, &candidates, MOST_ORDERS, OVER_MEDIAN);
-        let counts = [1, 2, 4, MOST_ORDERS].into_iter().filter(|count| *count < 2 * found.len().max(1));
-        let mut all: Vec<Alternative> =
-            counts.flat_map(|count| make.alternatives(&found[..count.min(found.len())], kinds * candidates.len())).collect();
+        // Steady ones alone, and all together where that finds others: a compensated motor's torque ripples itself.
+        let mut all: Vec<Alternative> = Vec::new();
+        for (effort, kinds) in [(&[][..], 1), (&effort, 2)] {
+            let found = waves::lines(&x, &r, effort, &candidates, MOST_ORDERS, OVER_MEDIAN);
+            for count in [1, 2, 4, MOST_ORDERS].into_iter().filter(|count| *count < 2 * found.len().max(1)) {
+                let found = &found[..count.min(found.len())];
+                if kinds == 1 || found.iter().any(|wave| wave.of_effort) {
+                    all.extend(make.alternatives(found, kinds * candidates.len()));
+                }
+            }
+        }
         // A compensated motor has the ripple in its torque and not in its motion: both are told.
         // Through a filter that lets ripples pass, at all samples: a motor that cogs stands still at times.
         let speed: Vec<Vec<f64>> = view
