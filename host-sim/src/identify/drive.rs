@@ -44,7 +44,7 @@ const GAIN: f64 = 5e-3;
 const SLOWER_TOO: f64 = 2.0;
 /// A torque rests where it stays within so many deviations of its noise over so many samples about a point.
 const RESTS_WITHIN: f64 = 4.0;
-const SMOOTHED_OVER: usize = 32;
+const SMOOTHED_OVER: usize = WIDEST_MEAN as usize;
 /// Names of the base parameters' places.
 pub const INERTIA: usize = 0;
 /// Place of the Coulomb torque.
@@ -523,7 +523,12 @@ mod tests {
         let of = |range: std::ops::Range<usize>| rms(&balance.deviation[range]);
         let [rests, swings] = [of(500..3500), of(4500..6000)];
         let of_bridge = BRIDGE_NM * white_share(logs[0].width);
-        // Of means over 32 samples' width a third as much is left as behind the filter.
+        // It is as large as what is left there, …
+        for range in [500..3500, 4500..6000] {
+            let ratio = rms(&balance.deviation[range.clone()]) / rms(&solved.residual[range]);
+            assert!((0.7..1.5).contains(&ratio), "{ratio}");
+        }
+        // … and of means over 32 samples' width a third as much is left as behind the filter.
         assert!(
             rests < 0.5 * of_bridge && (0.9..1.5).contains(&(swings / of_bridge)),
             "{rests} {swings} {of_bridge}"

@@ -138,9 +138,9 @@ pub fn white_share(width: f64) -> f64 {
 /// Widths that are tried in turn, samples, and half width of the interval in which the truth lies, in deviations of what is left of
 /// the noise: so wide that noise seldom passes for a peak.
 const WIDER: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, WIDEST_MEAN];
+const WITHIN: f64 = 3.0;
 /// The widest of them.
 pub const WIDEST_MEAN: f64 = 32.0;
-const WITHIN: f64 = 3.0;
 
 /// A signal without its white noise of this deviation, smoothed at each point as widely as the narrower estimates allow: the
 /// rule of intersecting confidence intervals (A. Goldenshluger, A. Nemirovski, Math. Methods Statist. 6, 1997). Steps and peaks

@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_grid_that_wanders_is_followed() {
-        // By 20 mHz, half a minute a swing: a phase that is not followed would leave a third of its power.
+        // By 20 mHz, half a minute a swing: a phase that is not followed would leave a tenth of its power.
         let left = left(0.03, |t| 50.0 * t + 0.02 * (TAU * t / 30.0).sin() * 30.0 / TAU);
         assert!(left.powi(2) < 0.06, "{left}");
     }

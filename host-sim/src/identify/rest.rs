@@ -293,14 +293,13 @@ impl<'c> LeftByContact<'c> {
     /// it leaves in the drive.
     pub fn shared_with(&mut self, drive: &Balance, residual: &[f64]) -> f64 {
         let slides = self.contact.problem().slides(self.contact.fit(self.place));
-        let starts: Vec<usize> = drive.starts.clone();
         let white = rms(&self.ground.noise.white).powi(2);
         let left = [
             Left { residual: &self.residual_nm, rows: &self.ground.rows },
             Left { residual, rows: &drive.used },
         ];
         let shared = |block: usize, counts: &dyn Fn(usize) -> bool| {
-            bridge_noise::variance_of_mean(left, &starts, block, white, counts)
+            bridge_noise::variance_of_mean(left, &drive.starts, block, white, counts)
         };
         let blocks = self.ground.blocks;
         // Where the tip sticks its slip is observed from the force, the bridge's error and all.

@@ -1,7 +1,7 @@
 //! The Stribeck curve, eq. 13: g(v) = θ (a0 + a1 exp(−(|v|/v0)^δ)).
 //!
 //! The paper has δ = 0.5; 0.5 to 1, 2 and far more have been fitted elsewhere (Armstrong-Hélouvry, Dupont and
-//! Canudas de Wit 1994, section 2.1), so δ is a parameter, limited to [0.1, 4]. With δ < 1 the slope g′ is infinite at v = 0, but v·g′(v) is finite everywhere, so solvers use that.
+//! Canudas de Wit 1994), so δ is a parameter, limited to [0.1, 4]. With δ < 1 the slope g′ is infinite at v = 0, but v·g′(v) is finite everywhere, so solvers use that.
 //! Monotonically falling by construction; the measured bell (Fig. 27) is in [`super::static_curve`].
 
 use crate::error::{ParameterError, require};

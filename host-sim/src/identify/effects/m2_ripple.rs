@@ -81,6 +81,10 @@ impl Effect for M2Ripple {
             let orders = waves::fixed(&alternative.constants);
             let sizes = orders.iter().enumerate().map(|(i, k)| (format!("speed_amplitude_{}", i + 1), waves::amplitude(&positions, &speed, k.number)));
             alternative.constants.extend(sizes);
+            if orders.iter().any(|wave| wave.of_effort) {
+                // At which a wave in proportion to the torque has its amplitude.
+                alternative.constants.push(("usual_torque_nm".into(), view.scales.effort));
+            }
         }
         all
     }
