@@ -122,13 +122,8 @@ mod long {
         named(&[Effect::BridgeDrift], 211, Base::Series);
     }
 
-    #[test]
-    #[ignore = "long: cargo verify runs it"]
-    fn breakaway_that_grows_with_rest_is_named_through_stick_slip() {
-        named(&[Effect::StaticAgeing], 205, Base::Series);
-    }
-
-    /// The elements have just touched where each log begins: the first breakaway is not that of a contact that is a second old.
+    /// Through stick-slip, and the elements have just touched where each log begins: the first breakaway is not that of a contact
+    /// that is a second old.
     #[test]
     #[ignore = "long: cargo verify runs it"]
     fn how_old_the_contact_is_at_first_is_no_wear() {
@@ -183,12 +178,6 @@ mod long {
         let found = written.diagnosis.causes[0].parameters["normal_high_n"].value;
         assert!((found / top - 1.0).abs() < 0.02, "{found} for {top}");
         assert!(!written.model.contains("friction_high_nm"), "{}", written.model);
-    }
-
-    #[test]
-    #[ignore = "long: cargo verify runs it"]
-    fn springs_that_harden_are_named() {
-        named(&[Effect::FoilHardening], 101, Base::Lugre);
     }
 
     #[test]
