@@ -135,6 +135,11 @@ pub fn white_share(width: f64) -> f64 {
     (0.5 / (std::f64::consts::PI.sqrt() * width)).sqrt()
 }
 
+/// Share of white noise that [`smoothed_flat`] of this width leaves: ∫((3 − x²)/2)² of a Gaussian's square is 27/16 of its area.
+pub fn white_share_flat(width: f64) -> f64 {
+    (27.0_f64 / 16.0).sqrt() * white_share(width)
+}
+
 /// Widths that are tried in turn, samples, and half width of the interval in which the truth lies, in deviations of what is left of
 /// the noise: so wide that noise seldom passes for a peak.
 const WIDER: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, WIDEST_MEAN];
@@ -153,26 +158,36 @@ pub fn adaptively_smoothed(signal: &[f64], noise: f64) -> Vec<f64> {
 /// in the one with less noise is so in the other.
 pub fn smoothed_together<const N: usize>(signals: [(&[f64], f64); N]) -> Vec<f64> {
     let mut out = signals[0].0.to_vec();
+    widest_agreeing(signals, &WIDER, |i, _, smoothed| out[i] = smoothed);
+    out
+}
+
+/// Tells of each sample, and of each of these widths in turn as long as the estimates of all signals agree with all narrower
+/// ones: the sample, the width's place, the first signal smoothed.
+pub fn widest_agreeing<const N: usize>(
+    signals: [(&[f64], f64); N],
+    widths: &[f64],
+    mut tell: impl FnMut(usize, usize, f64),
+) {
     let interval = |value: f64, left: f64| (value - WITHIN * left, value + WITHIN * left);
     let first = |(signal, noise): (&[f64], f64)| -> Vec<(f64, f64)> {
         signal.iter().map(|x| interval(*x, noise)).collect()
     };
     let mut within = signals.map(first);
-    let mut open = vec![true; out.len()];
-    for width in WIDER {
-        let smoothed = signals.map(|(signal, _)| gaussian(signal, width, 0));
-        for i in 0..out.len() {
+    let mut open = vec![true; within[0].len()];
+    for (at, width) in widths.iter().enumerate() {
+        let smoothed = signals.map(|(signal, _)| gaussian(signal, *width, 0));
+        for i in 0..open.len() {
             for ((within, smoothed), (_, noise)) in within.iter_mut().zip(&smoothed).zip(&signals) {
-                let own = interval(smoothed[i], noise * white_share(width));
+                let own = interval(smoothed[i], noise * white_share(*width));
                 within[i] = (within[i].0.max(own.0), within[i].1.min(own.1));
                 open[i] &= within[i].0 <= within[i].1;
             }
             if open[i] {
-                out[i] = smoothed[0][i];
+                tell(i, at, smoothed[0][i]);
             }
         }
     }
-    out
 }
 
 /// Largest value within `half` samples on either side.

@@ -10,8 +10,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::contact::log::{ContactLog, OBSERVED_OVER};
+use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
+use super::contact::smoothing::OBSERVED_OVER;
 use super::filters::rms;
 use super::fit_bias::Resimulated;
 use super::fit_interval::Linearised;

@@ -113,7 +113,7 @@ pub fn errors(
     let mut out = Vec::new();
     if let Some(contact) = &found.contact {
         let place = found.place(Part::Friction).unwrap_or(0);
-        let prepared = logs.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+        let prepared = ContactLog::all(logs, rig, &contact.baseline.numbers)?;
         let change = contact.change(place);
         let sensed = contact_part::behind_channel(&prepared, &change);
         let told = contact.heard(Part::Drive, sensed.as_ref().unwrap_or(&prepared), training);

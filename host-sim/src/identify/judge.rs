@@ -4,6 +4,7 @@
 //! over the balances, each with the best of its sets that has no other effect. So a sensor's fault that the contact could
 //! take for friction is decided by the drive, without a rule.
 
+use super::contact::baseline::{KNOWN_WITHIN, baseline};
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::ringing::fast_line;
@@ -221,7 +222,7 @@ fn of_contact_logs(
     model: &ModelFile,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Found, InputError> {
-    let logs = train.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+    let logs = ContactLog::all(train, rig, &baseline(model, KNOWN_WITHIN).numbers)?;
     let mut notes: Vec<String> = train.iter().filter_map(speed_note).collect();
     notes.extend(logs.iter().filter_map(|log| ring_note(log, rig)));
     progress("drive");

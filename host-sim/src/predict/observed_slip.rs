@@ -23,8 +23,8 @@ pub const COLUMN: &str = "predicted_by_observed_slip";
 /// # Errors
 /// Where the log is none of a contact.
 pub fn predict_by_observed_slip(model: &ModelFile, rig: &RigFile, log: &Log) -> Result<Vec<f64>, InputError> {
-    let logs = [ContactLog::new(log, rig)?];
     let baseline = Baseline { free: Vec::new(), ..baseline::baseline(model, baseline::KNOWN_WITHIN) };
+    let logs = [ContactLog::new(log, rig)?.seen_through(&baseline.numbers)];
     let shown = Problem::new(&logs, &baseline, &[]).predict(&[], &[]).shown_nm;
     let grid = &logs[0].grid;
     let times_s: Vec<f64> = grid.time_s.iter().map(|t| t + grid.start_s).collect();

@@ -123,6 +123,7 @@ mod tests {
             factor: None,
             slip_threshold_m_s: 5e-3,
             late: 0.0,
+            smoothed: &[],
             noise,
         }
     }

@@ -2,7 +2,10 @@
 
 use std::borrow::Cow;
 
+use super::observer::{SLIP_NOISES, slip_noise_m_s};
+use super::problem::Numbers;
 use super::ringing::Ringing;
+use super::smoothing::{OBSERVED_OVER, Smoothing};
 use crate::files::log::{Log, unwrapped};
 use crate::files::rig_file::RigFile;
 use crate::files::signal::Signal;
@@ -16,10 +19,6 @@ use crate::predict::BridgeModel;
 /// Width of the Gaussian over which speed column and angle are blended, samples: above it the speed column is the
 /// quieter, below it the angle.
 const BLEND: f64 = 12.0;
-
-/// Width over which the friction channel is smoothed before the slip is observed from it, samples: at a kilohertz 94 % of
-/// what rings at 120 Hz, as the load does, pass, and 6 % of what a torque ring of 600 Hz shows at 400.
-pub const OBSERVED_OVER: f64 = 1.2;
 
 /// Signals of a contact log on an even grid, SI units.
 #[derive(Debug, Clone)]
@@ -48,8 +47,10 @@ pub struct ContactLog {
     pub normal_n: Vec<f64>,
     /// Friction torque without what its bridge picks up from the mains, N m.
     pub friction_nm: Vec<f64>,
-    /// The same, lightly smoothed: what the slip is observed from.
+    /// The same, smoothed: what the slip is observed from.
     pub observed_nm: Vec<f64>,
+    /// How it is smoothed.
+    pub smoothing: Smoothing,
     /// The same, smoothed more: for coordinates and noise levels.
     pub smooth_nm: Vec<f64>,
     /// Its largest change a sample near by, N m.
@@ -119,6 +120,7 @@ impl ContactLog {
             source: log.source.clone(),
             root_speed_m_s: gaussian(&speed, 3.0, 0),
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
+            smoothing: Smoothing::default(),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
             speed_noise_m_s: radius_m * speed_noise,
@@ -142,6 +144,33 @@ impl ContactLog {
             friction_noise_nm,
             normal_noise_n,
         })
+    }
+
+    /// Prepares logs that are seen through the block of a model with these numbers, where it has one.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn all(logs: &[Log], rig: &RigFile, numbers: &Numbers) -> Result<Vec<Self>, InputError> {
+        logs.iter().map(|log| Ok(Self::new(log, rig)?.seen_through(numbers))).collect()
+    }
+
+    /// Smoothed as far as it takes to tell slip from the channel's noise through a model's block.
+    #[must_use]
+    pub fn seen_through(mut self, numbers: &Numbers) -> Self {
+        if numbers.bristles_alone || !self.grid.is_dense() {
+            return self;
+        }
+        let noise_n = self.friction_noise_nm / self.radius_m;
+        let told_m_s = SLIP_NOISES
+            * slip_noise_m_s(
+                noise_n,
+                (numbers.stiffness_n_per_m, numbers.damping_n_s_per_m),
+                self.grid.interval_s(),
+            );
+        let usual_m_s = rms(&self.root_speed_m_s);
+        self.smoothing = Smoothing::new(&self.friction_nm, self.friction_noise_nm, told_m_s, usual_m_s);
+        self.observed_nm = self.smoothing.further(self.observed_nm, 0.0);
+        self
     }
 
     /// With the disc's own angle in place of the encoder's.

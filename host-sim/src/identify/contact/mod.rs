@@ -11,4 +11,5 @@ pub mod observer;
 pub mod problem;
 pub mod ringing;
 pub mod search;
+pub mod smoothing;
 mod struck_mode;

@@ -18,8 +18,8 @@
 //! Left out: what the force did between samples; slip that begins and ends within one.
 
 use super::law::Contact;
-use super::log::OBSERVED_OVER;
-use crate::identify::filters::{shifted, smoothed_flat};
+use super::smoothing::{OBSERVED_OVER, widths};
+use crate::identify::filters::{gaussian, shifted, smoothed_flat};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Slip is faster than so many deviations of its noise.
@@ -60,6 +60,8 @@ pub struct Drive<'a> {
     pub slip_threshold_m_s: f64,
     /// How late the channel is that the force was seen by, samples: its noise is interpolated on the way there and back.
     pub late: f64,
+    /// How widely the force is smoothed at each sample: places in [`widths`]; nothing where it is the least everywhere.
+    pub smoothed: &'a [u8],
     /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
     pub noise: (f64, f64),
 }
@@ -69,6 +71,12 @@ impl Drive<'_> {
     #[inline]
     pub(super) fn at_end(&self, i: usize) -> bool {
         self.ends.is_some_and(|ends| ends[i] != 0)
+    }
+
+    /// How widely the force is smoothed at a sample.
+    #[inline]
+    fn smoothed_at(&self, i: usize) -> usize {
+        self.smoothed.get(i).map_or(0, |place| usize::from(*place))
     }
 
     /// What the measurement says that the law does not, N: nothing of a force beyond the end that the channel is at.
@@ -240,13 +248,15 @@ struct OwnNoise {
 }
 
 impl OwnNoise {
-    fn new(block: &Block, contact: &Contact, step_s: f64, late: f64) -> Self {
-        // A block that follows within 50 samples has come to rest behind the impulse.
-        const SAMPLES: usize = 256;
+    /// Of a force that is smoothed further over so many samples.
+    fn new(block: &Block, contact: &Contact, step_s: f64, late: f64, further: f64) -> Self {
+        // A block that follows within 50 samples has come to rest behind the impulse, and what smooths it.
+        const SAMPLES: usize = 512;
         const AT: usize = SAMPLES / 4;
         let mut impulse = vec![0.0; SAMPLES];
         impulse[AT] = 1.0;
-        let force = shifted(&smoothed_flat(&impulse, OBSERVED_OVER), late);
+        let smooth = gaussian(&smoothed_flat(&impulse, OBSERVED_OVER), further, 0);
+        let force = shifted(&smooth, late);
         let block_m = block.ways(0.0, &force).block_m;
         let rate = |i: usize| contact.damping_n_s_per_m * (block_m[i + 1] - block_m[i - 1]) / (2.0 * step_s);
         let rates: Vec<f64> = (1..SAMPLES - 1).map(rate).collect();
@@ -264,6 +274,11 @@ impl OwnNoise {
 /// variance that is left.
 fn steady_gain(added: f64) -> f64 {
     if added > 1e6 { 1.0 } else { 0.5 * ((added * (added + 4.0)).sqrt() - added) }
+}
+
+/// The force's noise passes to the slip through a block's stiffness and damping: n/c, or n/(k h) where there is no damper.
+pub fn slip_noise_m_s(noise_n: f64, (stiffness, damping): (f64, f64), interval_s: f64) -> f64 {
+    noise_n / damping.max(stiffness * interval_s)
 }
 
 /// Runs over a log.
@@ -286,10 +301,10 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
 
     let coulomb = contact.curve.at_speed();
     let least_load = least_load_n(drive);
-    // The force's noise passes to the slip through the block: n/c, or n/(k h) where there is no damper.
-    let slip_noise = drive.noise.1 / c.max(k * drive.interval_s);
-    let threshold = drive.slip_threshold_m_s.max(SLIP_NOISES * slip_noise);
-    let creep_noise = drive.noise.0.hypot(slip_noise);
+    let slip_noise = slip_noise_m_s(drive.noise.1, (k, c), drive.interval_s);
+    let thresholds: Vec<f64> =
+        widths().map(|(_, kept)| drive.slip_threshold_m_s.max(SLIP_NOISES * kept * slip_noise)).collect();
+    let creep_noises: Vec<f64> = widths().map(|(_, kept)| drive.noise.0.hypot(kept * slip_noise)).collect();
     // Variances of k times the block's way over that of the force's noise: what a step adds, what is left at rest.
     let force_noise_n = drive.noise.1.max(1e-12);
     let added = (k * drive.noise.0 * dt / force_noise_n).powi(2);
@@ -304,10 +319,14 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
     // Between samples that are far apart the force is not noise but a guess.
-    let own_noise = (drive.dense && c > 0.0).then(|| OwnNoise::new(&block, contact, dt, drive.late));
+    let most = drive.smoothed.iter().copied().max().map_or(0, usize::from);
+    let own_noise: Option<Vec<OwnNoise>> = (drive.dense && c > 0.0).then(|| {
+        let of_width = |(further, _)| OwnNoise::new(&block, contact, dt, drive.late, further);
+        widths().take(most + 1).map(of_width).collect()
+    });
     let motion = Motion { root_m: drive.root_m, block_m: &ways.block_m, rate: 1.0 / dt };
     motion.slip_speeds(&mut out.slip_m_s);
-    slides(&motion, drive, coulomb, threshold, &mut out);
+    slides(&motion, drive, coulomb, &thresholds, &mut out);
     out.force_n[0] = force[0];
     for i in 1..n {
         let w = out.slip_m_s[i];
@@ -323,6 +342,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             loaded *= ageing.factor(age);
         }
         let slips = out.sliding[i];
+        let place = drive.smoothed_at(i);
         if drive.ends.is_some() {
             lost = if drive.at_end(i) { 1.0 } else { lost * forgets };
         }
@@ -331,7 +351,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let (coefficient, derivative) = contact.curve.at_with_derivative(speed);
             let viscous = per_load * load + film;
             if let Some(own) = &own_noise {
-                out.own_noise[i] += slips * (own.left(-(loaded * derivative + viscous) / c) - 1.0);
+                out.own_noise[i] += slips * (own[place].left(-(loaded * derivative + viscous) / c) - 1.0);
             }
             1f64.copysign(w) * (loaded * coefficient + viscous * speed)
         } else {
@@ -346,12 +366,12 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             }
             // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
             // Slower than what counts as slip it is friction at the slip's speed, its noise taken off.
-            let creep = (speed * speed - creep_noise * creep_noise).max(0.0).sqrt();
+            let creep = (speed * speed - creep_noises[place].powi(2)).max(0.0).sqrt();
             let limit = loaded * contact.curve.at(creep);
             let over = (sticking.abs() - limit) / (LIMIT_WIDTH * limit);
             let mut breaks = 0.0;
             if over > -SATURATED {
-                let towards = sigmoid((sticking.signum() * v / (0.1 * threshold) - 1.0) / WIDTH);
+                let towards = sigmoid((sticking.signum() * v / (0.1 * thresholds[place]) - 1.0) / WIDTH);
                 let beyond = if over > SATURATED {
                     sticking.abs() - limit
                 } else {
@@ -421,15 +441,15 @@ impl Motion<'_> {
 }
 
 /// Share of slip in the blend at each sample but the first.
-fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, threshold: f64, out: &mut Observed) {
+fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, thresholds: &[f64], out: &mut Observed) {
     let steep = 1.0 / WIDTH;
-    let by_speed = steep / threshold;
     let by_share = steep / LEAST_SHARE;
     let by_force = steep / (LEAST_FORCE * coulomb);
     for i in 1..motion.root_m.len() {
         let w = out.slip_m_s[i];
         let speed = w.abs();
-        let fast = by_speed * speed - steep;
+        let threshold = thresholds[drive.smoothed_at(i)];
+        let fast = steep * (speed / threshold - 1.0);
         out.sliding[i] = if fast < -SATURATED {
             0.0
         } else {
@@ -475,10 +495,12 @@ mod tests {
         let root_m: Vec<f64> = (0..n).map(|i| speed * STEP_S * i as f64).collect();
         let (loads, slope) = (vec![load; n], 1.2);
         let force_n: Vec<f64> = (0..n).map(|_| load * 0.6 + NOISE_N * noise.next()).collect();
-        let smooth = smoothed_flat(&force_n, OBSERVED_OVER);
+        let least = smoothed_flat(&force_n, OBSERVED_OVER);
         // As with a sample missing now and then: the points are hardly closer than the samples.
-        let left = |damping: f64, late: f64, stated: bool| {
-            let seen_n = shifted(&smooth, late);
+        let left = |damping: f64, late: f64, place: u8, stated: bool| {
+            let (further, _) = widths().nth(usize::from(place)).unwrap();
+            let seen_n = shifted(&gaussian(&least, further, 0), late);
+            let smoothed = vec![place; n];
             let contact = block(25_000.0, damping, Curve::new(|w| (0.6 - slope * (w - speed)).max(0.1)));
             let drive = Drive {
                 step_s: STEP_S,
@@ -491,6 +513,7 @@ mod tests {
                 factor: None,
                 slip_threshold_m_s: 1e-3,
                 late,
+                smoothed: &smoothed,
                 noise: (1e-6, NOISE_N),
             };
             let seen = observe(&contact, &drive);
@@ -502,12 +525,13 @@ mod tests {
             ((500..n - 500).map(of).sum::<f64>() / (n - 1000) as f64).sqrt() / NOISE_N
         };
         // F_N |g′| is 96 N s/m. Between samples a channel that is late is interpolated, which smooths its noise.
-        for (damping, late) in [(96.0, 0.0), (150.0, 0.0), (300.0, 0.0), (96.0, 0.5), (150.0, 0.5)] {
-            let left = left(damping, late, true);
-            assert!((left - 1.0).abs() < 0.03, "{damping} {late}: {left}");
+        let least = [(96.0, 0.0, 0), (150.0, 0.0, 0), (300.0, 0.0, 0), (96.0, 0.5, 0), (150.0, 0.5, 0)];
+        for (damping, late, place) in least.into_iter().chain([(96.0, 0.0, 2), (150.0, 0.5, 4)]) {
+            let left = left(damping, late, place, true);
+            assert!((left - 1.0).abs() < 0.03, "{damping} {late} {place}: {left}");
         }
         // As it is, the one at which the slope's force cancels the damper's would leave least.
-        let (near, far) = (left(96.0, 0.0, false), left(300.0, 0.0, false));
+        let (near, far) = (left(96.0, 0.0, 0, false), left(300.0, 0.0, 0, false));
         assert!(near < far - 0.05, "{near} {far}");
     }
 
@@ -539,6 +563,7 @@ mod tests {
                 // Nothing slips here, nor where what stands in ends in a jump.
                 slip_threshold_m_s: 0.5,
                 late: 0.0,
+                smoothed: &[],
                 noise: (1e-3, 0.15),
             };
             let seen = observe(&contact, &drive).force_n;
@@ -581,6 +606,7 @@ mod tests {
                 factor: None,
                 slip_threshold_m_s: 1e-4,
                 late: 0.0,
+                smoothed: &[],
                 noise: (1e-5, 0.15),
             };
             let seen = observe(&contact, &drive).sliding;

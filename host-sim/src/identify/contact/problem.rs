@@ -316,6 +316,7 @@ impl<'a> Problem<'a> {
             // What the channel adds is taken off first, so that it changes the observed slip too.
             let mut channel = Channel::new(log, at, change, &numbers);
             let seen_nm = channel.seen_nm();
+            let smoothed = log.smoothing.ahead(channel.late());
             let mut force_n: Vec<f64> = seen_nm.iter().map(|t| t / log.radius_m).collect();
             let ends = channel.ends(seen_nm);
             let usual = rms(&log.root_speed_m_s);
@@ -332,6 +333,7 @@ impl<'a> Problem<'a> {
                 factor: factor.as_deref(),
                 slip_threshold_m_s: (SLOWEST_SLIP * usual).max(SLIP_NOISES * log.speed_noise_m_s).max(1e-9),
                 late: channel.late(),
+                smoothed: &smoothed,
                 noise: (
                     log.speed_noise_m_s.max(DRIFT * usual),
                     log.friction_noise_nm.max(1e-12) / log.radius_m,
