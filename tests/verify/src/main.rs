@@ -78,8 +78,9 @@ fn host(run: &mut Runner) {
 fn policy(run: &mut Runner) {
     let name = "dependencies";
     if !run.has(&["deny", "--version"]) {
-        // Unoptimised: it is built in a third of the time, and its check takes three seconds.
-        run.cargo("cargo-deny", ".", &["install", "--quiet", "--locked", "--debug", "cargo-deny"]);
+        // Unoptimised and not for a debugger: it is built in a third of the time, and its check takes three seconds.
+        let install = ["install", "--quiet", "--locked", "--debug", "cargo-deny"];
+        run.cargo_env("cargo-deny", ".", &install, &[("CARGO_PROFILE_DEV_DEBUG", "0")]);
     }
     if !run.has(&["deny", "--version"]) {
         run.note(
