@@ -169,7 +169,8 @@ impl ContactLog {
             );
         let usual_m_s = rms(&self.root_speed_m_s);
         self.smoothing = Smoothing::new(&self.friction_nm, self.friction_noise_nm, told_m_s, usual_m_s);
-        self.observed_nm = self.smoothing.further(self.observed_nm, 0.0);
+        let least_nm = smoothed_flat(&self.friction_nm, OBSERVED_OVER);
+        self.observed_nm = self.smoothing.further(least_nm, 0.0);
         self
     }
 
