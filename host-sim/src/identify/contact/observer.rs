@@ -443,17 +443,18 @@ impl Motion<'_> {
 /// Share of slip in the blend at each sample but the first.
 fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, thresholds: &[f64], out: &mut Observed) {
     let steep = 1.0 / WIDTH;
+    let by_speed: Vec<f64> = thresholds.iter().map(|threshold| steep / threshold).collect();
     let by_share = steep / LEAST_SHARE;
     let by_force = steep / (LEAST_FORCE * coulomb);
     for i in 1..motion.root_m.len() {
         let w = out.slip_m_s[i];
         let speed = w.abs();
-        let threshold = thresholds[drive.smoothed_at(i)];
-        let fast = steep * (speed / threshold - 1.0);
+        let place = drive.smoothed_at(i);
+        let fast = by_speed[place] * speed - steep;
         out.sliding[i] = if fast < -SATURATED {
             0.0
         } else {
-            let share = by_share * speed / (motion.root_m_s(i).abs() + 1e-3 * threshold) - steep;
+            let share = by_share * speed / (motion.root_m_s(i).abs() + 1e-3 * thresholds[place]) - steep;
             let resisting = by_force * drive.force_n[i] * 1f64.copysign(w) / drive.load_n[i] - steep;
             if fast.min(share).min(resisting) > SATURATED {
                 1.0
