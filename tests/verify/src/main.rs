@@ -5,6 +5,9 @@
 //! one fails; the table at the end says how each ended. What this machine lacks is fetched where that
 //! is possible, and named with the command that would get it where it is not.
 //!
+//! Policy, firmware and the building of the bench do not wait for the host suite: they run beside it, so that both cores have work
+//! while one crate is compiled or one test is left. What they print comes after what the suite prints.
+//!
 //! `cargo verify firmware bench` runs only these parts; the parts are host, policy, firmware, bench. `cargo verify layout`
 //! draws the project's floors from the source (`layout.rs`).
 
@@ -45,14 +48,41 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     }
     let root = root();
+    let wants = |part: &str| wanted.is_empty() || wanted.iter().any(|name| name == part);
     let mut run = Runner::new(&root);
-    for part in PARTS.into_iter().filter(|part| wanted.is_empty() || wanted.iter().any(|name| name == part)) {
-        match part {
-            "host" => host(&mut run),
-            "policy" => policy(&mut run),
-            "firmware" => firmware(&mut run, &root),
-            _ => bench(&mut run),
+    let others = |run: &mut Runner| {
+        if wants("policy") {
+            policy(run);
         }
+        if wants("firmware") {
+            firmware(run, &root);
+        }
+        if wants("bench") {
+            bench_build(run);
+        }
+    };
+    if wants("firmware") || wants("bench") {
+        // Before anything compiles: rustup does one thing at a time.
+        run.target(TARGET);
+    }
+    if wants("host") {
+        let mut beside = match Runner::beside(&root, &root.join("target/verify/beside-the-host-suite.log")) {
+            Ok(beside) => beside,
+            Err(error) => {
+                eprintln!("verify: target/verify: {error}");
+                return ExitCode::FAILURE;
+            }
+        };
+        std::thread::scope(|scope| {
+            scope.spawn(|| others(&mut beside));
+            host(&mut run);
+        });
+        run.join(beside);
+    } else {
+        others(&mut run);
+    }
+    if wants("bench") {
+        bench(&mut run);
     }
     run.summary()
 }
@@ -120,10 +150,19 @@ fn firmware(run: &mut Runner, root: &Path) {
     }
 }
 
+/// The arguments that build the bench's suite, and with more run it.
+fn bench_suite(more: &[&'static str]) -> Vec<&'static str> {
+    [&["test", "--release"][..], &BENCH, more].concat()
+}
+
+fn bench_build(run: &mut Runner) {
+    run.cargo("bench build", ".", &bench_suite(&["--quiet", "--no-run"]));
+}
+
 fn bench(run: &mut Runner) {
     // In the profile of the host's lints, whose work it shares.
     let lints = [&["clippy", "--quiet", "--all-targets"][..], &BENCH, &["--", "-D", "warnings"]];
     run.cargo("bench lints", ".", &lints.concat());
     // Its tables are what a reader of the log wants to see.
-    run.cargo("bench suite", ".", &[&["test", "--release"][..], &BENCH, &["--", "--nocapture"]].concat());
+    run.cargo("bench suite", ".", &bench_suite(&["--", "--nocapture"]));
 }

@@ -1,7 +1,9 @@
 //! One step: the command as it is run, how it ended, how long it took.
 
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, ExitCode, ExitStatus, Stdio};
 use std::time::Instant;
 
 /// How a step ended.
@@ -27,12 +29,49 @@ pub(crate) struct Runner {
     root: PathBuf,
     cargo: String,
     steps: Vec<Step>,
+    /// Where what it runs is written, in place of the terminal.
+    log: Option<(PathBuf, File)>,
 }
 
 impl Runner {
     pub(crate) fn new(root: &Path) -> Self {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
-        Self { root: root.to_path_buf(), cargo, steps: Vec::new() }
+        Self { root: root.to_path_buf(), cargo, steps: Vec::new(), log: None }
+    }
+
+    /// One that runs beside another one: what it prints is kept until that one is done.
+    pub(crate) fn beside(root: &Path, log: &Path) -> io::Result<Self> {
+        std::fs::create_dir_all(log.parent().unwrap_or(root))?;
+        Ok(Self { log: Some((log.to_path_buf(), File::create(log)?)), ..Self::new(root) })
+    }
+
+    /// Takes over the steps of one that ran beside this one, and prints what it has kept.
+    pub(crate) fn join(&mut self, other: Self) {
+        if let Some((path, _)) = &other.log {
+            let kept = File::open(path).and_then(|mut kept| io::copy(&mut kept, &mut io::stdout()));
+            if let Err(error) = kept {
+                println!("verify: {}: {error}", path.display());
+            }
+        }
+        self.steps.extend(other.steps);
+    }
+
+    fn say(&mut self, line: &str) {
+        let said = match &mut self.log {
+            Some((_, log)) => writeln!(log, "{line}"),
+            None => writeln!(io::stdout(), "{line}"),
+        };
+        if let Err(error) = said {
+            eprintln!("verify: {error}: {line}");
+        }
+    }
+
+    /// Runs a command whose output goes where this runner's does.
+    fn ended(&self, command: &mut Command) -> io::Result<ExitStatus> {
+        if let Some((_, log)) = &self.log {
+            command.stdout(log.try_clone()?).stderr(log.try_clone()?);
+        }
+        command.status()
     }
 
     /// Runs cargo in a folder of the workspace, printed first.
@@ -44,11 +83,11 @@ impl Runner {
     pub(crate) fn cargo_env(&mut self, name: &str, folder: &str, arguments: &[&str], set: &[(&str, &str)]) {
         let place = if folder == "." { String::new() } else { format!("cd {folder} && ") };
         let variables: String = set.iter().map(|(key, value)| format!("{key}='{value}' ")).collect();
-        println!("\n$ {place}{variables}cargo {}", arguments.join(" "));
+        self.say(&format!("\n$ {place}{variables}cargo {}", arguments.join(" ")));
         let started = Instant::now();
         let mut command = self.command(arguments);
         command.current_dir(self.root.join(folder)).envs(set.iter().copied());
-        let ended = match command.status() {
+        let ended = match self.ended(&mut command) {
             Ok(status) if status.success() => Ended::Passed(String::new()),
             Ok(status) => Ended::Failed(format!("{status}")),
             Err(error) => Ended::Failed(error.to_string()),
@@ -87,10 +126,10 @@ impl Runner {
             libraries.is_ok_and(|out| Path::new(String::from_utf8_lossy(&out.stdout).trim()).is_dir())
         };
         if !here() {
-            println!("\n$ rustup target add {target}");
-            let asked = Command::new("rustup").args(["target", "add", target]).status();
+            self.say(&format!("\n$ rustup target add {target}"));
+            let asked = self.ended(Command::new("rustup").args(["target", "add", target]));
             if let Err(error) = asked {
-                println!("rustup: {error}");
+                self.say(&format!("rustup: {error}"));
             }
         }
         here()
