@@ -15,6 +15,7 @@ mod layout;
 mod size;
 mod step;
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -26,7 +27,10 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 /// The package that needs a newer declared Rust than the workspace's, and builds on it all the same.
 const BENCH: [&str; 3] = ["--package", "virtual-bench", "--ignore-rust-version"];
 
-/// The parts, in their order.
+/// Where what runs beside the host suite prints, from the workspace's root.
+const BESIDE: &str = "target/verify/beside-the-host-suite.log";
+
+/// The parts.
 const PARTS: [&str; 4] = ["host", "policy", "firmware", "bench"];
 
 fn main() -> ExitCode {
@@ -47,32 +51,34 @@ fn main() -> ExitCode {
         eprintln!("verify: {unknown}: no such part; allowed: {}", PARTS.join(", "));
         return ExitCode::from(2);
     }
-    let root = root();
-    let wants = |part: &str| wanted.is_empty() || wanted.iter().any(|name| name == part);
-    let mut run = Runner::new(&root);
+    match verified(&root(), |part| wanted.is_empty() || wanted.iter().any(|name| name == part)) {
+        Ok(ended) => ended,
+        Err(error) => {
+            eprintln!("verify: {BESIDE}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs the wanted parts; an error is one of making the file that those beside the host suite print to.
+fn verified(root: &Path, wants: impl Fn(&str) -> bool + Sync) -> io::Result<ExitCode> {
+    let mut run = Runner::new(root);
+    // Before anything compiles: rustup does one thing at a time.
+    let has_target = wants("firmware") && run.target(TARGET);
     let others = |run: &mut Runner| {
         if wants("policy") {
             policy(run);
         }
         if wants("firmware") {
-            firmware(run, &root);
+            firmware(run, root, has_target);
         }
         if wants("bench") {
             bench_build(run);
         }
     };
-    if wants("firmware") || wants("bench") {
-        // Before anything compiles: rustup does one thing at a time.
-        run.target(TARGET);
-    }
     if wants("host") {
-        let mut beside = match Runner::beside(&root, &root.join("target/verify/beside-the-host-suite.log")) {
-            Ok(beside) => beside,
-            Err(error) => {
-                eprintln!("verify: target/verify: {error}");
-                return ExitCode::FAILURE;
-            }
-        };
+        let mut beside = Runner::beside(root, Path::new(BESIDE))?;
+        println!("what runs beside the host suite prints to {BESIDE}, and is shown behind it");
         std::thread::scope(|scope| {
             scope.spawn(|| others(&mut beside));
             host(&mut run);
@@ -84,7 +90,7 @@ fn main() -> ExitCode {
     if wants("bench") {
         bench(&mut run);
     }
-    run.summary()
+    Ok(run.summary())
 }
 
 /// The workspace: this package lies in tests/verify.
@@ -131,8 +137,8 @@ fn policy(run: &mut Runner) {
     }
 }
 
-fn firmware(run: &mut Runner, root: &Path) {
-    if !run.target(TARGET) {
+fn firmware(run: &mut Runner, root: &Path, has_target: bool) {
+    if !has_target {
         let how = format!("the target could not be had: rustup target add {TARGET}");
         run.note("firmware", Ended::Lacking(how));
         return;

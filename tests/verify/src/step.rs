@@ -39,23 +39,27 @@ impl Runner {
         Self { root: root.to_path_buf(), cargo, steps: Vec::new(), log: None }
     }
 
-    /// One that runs beside another one: what it prints is kept until that one is done.
+    /// One that runs beside another one: what it prints goes to this file of the workspace until that one is done.
     pub(crate) fn beside(root: &Path, log: &Path) -> io::Result<Self> {
-        std::fs::create_dir_all(log.parent().unwrap_or(root))?;
-        Ok(Self { log: Some((log.to_path_buf(), File::create(log)?)), ..Self::new(root) })
+        let path = root.join(log);
+        std::fs::create_dir_all(path.parent().unwrap_or(root))?;
+        let log = File::create(&path)?;
+        Ok(Self { log: Some((path, log)), ..Self::new(root) })
     }
 
-    /// Takes over the steps of one that ran beside this one, and prints what it has kept.
+    /// Takes over the steps of one that ran beside this one, and shows what it has printed.
     pub(crate) fn join(&mut self, other: Self) {
         if let Some((path, _)) = &other.log {
-            let kept = File::open(path).and_then(|mut kept| io::copy(&mut kept, &mut io::stdout()));
-            if let Err(error) = kept {
+            let shown = File::open(path).and_then(|mut log| io::copy(&mut log, &mut io::stdout()));
+            if let Err(error) = shown {
+                // How its steps ended is known all the same.
                 println!("verify: {}: {error}", path.display());
             }
         }
         self.steps.extend(other.steps);
     }
 
+    /// A line of what this runner does.
     fn say(&mut self, line: &str) {
         let said = match &mut self.log {
             Some((_, log)) => writeln!(log, "{line}"),
