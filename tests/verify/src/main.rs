@@ -5,8 +5,8 @@
 //! one fails; the table at the end says how each ended. What this machine lacks is fetched where that
 //! is possible, and named with the command that would get it where it is not.
 //!
-//! Policy, firmware and the building of the bench do not wait for the host suite: they run beside it, so that both cores have work
-//! while one crate is compiled or one test is left. What they print comes after what the suite prints.
+//! Policy, firmware, and building and lints of the bench do not wait for the host suite: they run beside it, so that both cores have
+//! work while one crate is compiled or one test is left. What they print comes after what the suite prints.
 //!
 //! `cargo verify firmware bench` runs only these parts; the parts are host, policy, firmware, bench. `cargo verify layout`
 //! draws the project's floors from the source (`layout.rs`).
@@ -161,14 +161,15 @@ fn bench_suite(more: &[&'static str]) -> Vec<&'static str> {
     [&["test", "--release"][..], &BENCH, more].concat()
 }
 
+/// All of the bench that does not wait for a test.
 fn bench_build(run: &mut Runner) {
     run.cargo("bench build", ".", &bench_suite(&["--quiet", "--no-run"]));
-}
-
-fn bench(run: &mut Runner) {
     // In the profile of the host's lints, whose work it shares.
     let lints = [&["clippy", "--quiet", "--all-targets"][..], &BENCH, &["--", "-D", "warnings"]];
     run.cargo("bench lints", ".", &lints.concat());
+}
+
+fn bench(run: &mut Runner) {
     // Its tables are what a reader of the log wants to see.
     run.cargo("bench suite", ".", &bench_suite(&["--", "--nocapture"]));
 }
