@@ -6,8 +6,10 @@ use virtual_bench::budget::{Budget, Cost, RECORDED};
 #[test]
 fn no_tick_costs_more_than_is_on_the_record() {
     let budget = Budget::read().unwrap();
+    // From the last on: other checks begin with the first, and would wait for a run that is being made.
     let refused: Vec<String> = RECORDED
         .iter()
+        .rev()
         .filter_map(|name| {
             let cost = Cost::of(&run(name).ticks);
             println!("{name:<12} {cost}");
