@@ -69,8 +69,9 @@ impl Diagnose {
         overrides.only(true, true, false)?;
         let rig = RigFile::read_or_assumed(self.rig.as_deref(), &overrides.rig)?;
         let model = ModelFile::read_or_assumed(self.model.as_deref(), &overrides.model)?;
-        let read =
-            |paths: &[PathBuf]| paths.iter().map(|path| Log::read(path)).collect::<Result<Vec<_>, _>>();
+        let read = |paths: &[PathBuf]| {
+            paths.iter().map(|path| Log::read(path).map(Log::as_sampled)).collect::<Result<Vec<_>, _>>()
+        };
         let (train, holdout) = (read(&self.train)?, read(&self.holdout)?);
         let mut output = OutputDir::new(&self.out)?;
         // Drive, the contact's singles, pairs, triples, evidence, normal load, table, held out, extended model.

@@ -7,15 +7,18 @@
 //! Refused, with the line: NaN and infinities in known columns, time that stands still or goes back,
 //! gaps ([`gap rule`](Log::GAP_RULE)), ragged lines, two columns of one name, a known quantity in
 //! another unit.
-//! Left out: resampling. Uneven sampling is passed on as it is.
+//! Left out: resampling. Uneven sampling is passed on as it is; stamps that are uneven where the samples are not can be replaced
+//! ([`Log::as_sampled`]).
 
 use std::borrow::Cow;
 use std::path::Path;
 
 use super::signal::{SIGNALS, Signal};
 use super::speed_lag::{self, Lag};
+use super::stamp_wobble::even_samples;
 use super::{import, log_check, log_csv, log_mcap, log_parquet, plausible};
 use crate::input_error::InputError;
+use crate::notices;
 
 /// Cells of a column.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +63,9 @@ pub enum LogKind {
     /// A linear stage alone: force in, position out.
     LinearDrive,
 }
+
+/// Key of the metadata that say of time stamps that were replaced.
+const REPLACED_STAMPS: &str = "time stamps replaced";
 
 /// Signals over time.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -223,6 +229,35 @@ impl Log {
         }
     }
 
+    /// With the times at which its samples were taken, where the motion shows that the stamps wobble and the samples do not; what is
+    /// replaced is said, and kept with the log.
+    #[must_use]
+    pub fn as_sampled(mut self) -> Self {
+        let position = self.signal(Signal::M2Angle).map(unwrapped);
+        let position = position.or_else(|| self.signal(Signal::Position).map(<[f64]>::to_vec));
+        let Some(even) = position.and_then(|position| even_samples(self.time_s(), &position)) else {
+            return self;
+        };
+        let said = format!(
+            "{}: the time stamps wobble by {:.1} % of a step (RMS), the samples do not (the motion shows {:.0} ± {:.0} % of it): even \
+             times, {:.4} ms apart, are used in their place",
+            self.source,
+            100.0 * even.off_s / even.step_s,
+            100.0 * even.shown.0,
+            100.0 * even.shown.1,
+            1e3 * even.step_s,
+        );
+        notices::warn(&said);
+        self.metadata.push((REPLACED_STAMPS.into(), said));
+        self.set_signal(Signal::Time, even.time_s);
+        self
+    }
+
+    /// What was said of the time stamps where [`Self::as_sampled`] replaced them.
+    pub fn replaced_stamps(&self) -> Option<&str> {
+        self.metadata(REPLACED_STAMPS)
+    }
+
     /// By how much the speed lags the angle, where it surely does.
     pub fn speed_lag(&self) -> Option<Lag> {
         let (speed, angle) = (self.signal(Signal::M2Speed)?, self.signal(Signal::M2Angle)?);
@@ -348,6 +383,24 @@ pub(crate) fn slope(x: &[f64], y: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn even_samples_behind_uneven_stamps_are_put_in_their_place_and_it_is_said() {
+        let even: Vec<f64> = (0..5000).map(|i| 2e-3 * f64::from(i)).collect();
+        // Swings at random, as the digits of a square root are.
+        let wobble = |i: usize| 2e-4 * ((1e4 * (i as f64).sqrt()).fract() - 0.5);
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, even.iter().enumerate().map(|(i, t)| t + wobble(i)).collect());
+        let angle = |t: &f64| (9.0 * t - 3.0 * t.cos()).rem_euclid(std::f64::consts::TAU);
+        log.set_signal(Signal::M2Angle, even.iter().map(angle).collect());
+        let taken = log.clone().as_sampled();
+        for (taken, even) in taken.time_s().iter().zip(&even) {
+            assert!((taken - even).abs() < 1e-5, "{taken} {even}");
+        }
+        assert!(taken.replaced_stamps().is_some_and(|said| said.contains("2.0000 ms apart")));
+        log.set_signal(Signal::M2Angle, log.time_s().iter().map(angle).collect());
+        assert_eq!(log.clone().as_sampled(), log);
+    }
 
     #[test]
     fn an_angle_that_begins_anew_at_each_turn_gives_the_speed_where_the_column_lags() {

@@ -21,6 +21,7 @@ pub mod plausible;
 pub mod rig_file;
 pub mod signal;
 pub mod speed_lag;
+mod stamp_wobble;
 pub mod strain_gauges;
 pub mod toml_tree;
 #[cfg(feature = "parquet")]

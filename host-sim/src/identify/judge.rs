@@ -73,7 +73,9 @@ pub fn judge(
         progress("drive");
         Found { drive: Some(of_drive_logs(train, !linear_stage)?), ..Found::default() }
     };
-    let Found { contact, drive, normal_load, mut notes } = found;
+    let Found { contact, drive, normal_load, notes: of_kind } = found;
+    let stamps = train.iter().filter_map(|log| log.replaced_stamps().map(str::to_string));
+    let mut notes: Vec<String> = stamps.chain(of_kind).collect();
     let drive = with_rows(drive, Part::Drive, "the drive", &mut notes);
     let normal_load = with_rows(normal_load, Part::Pressure, "the normal-load actuator", &mut notes);
     let mut parts: Vec<(Part, Vec<Candidate>)> = Vec::new();
