@@ -239,7 +239,7 @@ impl Log {
             return self;
         };
         let said = format!(
-            "{}: the time stamps wobble by {:.1} % of a step (RMS), the samples do not (the motion shows {:.0} ± {:.0} % of it): even \
+            "{}: the time stamps wobble by {:.1} % of a step (RMS), the samples do not (the motion shows {:.1} ± {:.1} % of it): even \
              times, {:.4} ms apart, are used in their place",
             self.source,
             100.0 * even.off_s / even.step_s,
