@@ -179,7 +179,8 @@ impl FittedLaws {
     }
 }
 
-/// A model file with fitted numbers; `block` makes a model without one the series element.
+/// A model file with fitted numbers; `block` makes a model without one the series element, with brush friction in it as a curve
+/// that falls at once.
 fn with_numbers(
     model: &ModelFile,
     numbers: &Numbers,
@@ -187,13 +188,28 @@ fn with_numbers(
 ) -> Result<ModelFile, InputError> {
     let theta = model.get("theta").unwrap_or(1.0);
     let n = numbers;
+    if let (Some((k, c)), ModelKind::Brush) = (block, model.kind) {
+        let values = [
+            ("sigma0_n_per_m", n.stiffness_n_per_m),
+            ("sigma1_n_s_per_m", n.damping_n_s_per_m),
+            ("a0", n.a0),
+            ("a1", n.a1),
+            ("a2_s_per_m", n.a2_s_per_m),
+            ("v0_m_s", n.v0_m_s),
+            ("delta", n.delta),
+            ("theta", theta),
+            ("k_u_n_per_m", k),
+            ("c_u_n_s_per_m", c),
+        ];
+        return ModelFile::new("model-extended.toml", ModelKind::Series, &values);
+    }
     let stiffness = if has_block(model) { "k_u_n_per_m" } else { "sigma0_n_per_m" };
     let damping = if has_block(model) { "c_u_n_s_per_m" } else { "sigma1_n_s_per_m" };
     let fitted = [
         ("a0", n.a0 / theta),
         ("a1", n.a1 / theta),
         ("v0_m_s", n.v0_m_s),
-        ("delta", n.delta.clamp(0.25, 2.0)),
+        ("delta", n.delta.clamp(0.1, 4.0)),
         ("a2_s_per_m", n.a2_s_per_m),
         (stiffness, n.stiffness_n_per_m),
         (damping, n.damping_n_s_per_m),
@@ -292,4 +308,23 @@ pub fn remarks(found: &Judgement) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
+
+    #[test]
+    fn any_model_with_the_block_that_was_found_is_a_model_of_the_same_friction() {
+        let brush = "kind = \"brush\"\n[parameters]\nc_n_per_m = 3e4\nmu_s = 1.0\nmu_c = 0.5\n";
+        let lugre = "kind = \"lugre\"\n[parameters]\nsigma0_n_per_m = 3e4\nsigma1_n_s_per_m = 0.0\na0 = 0.5\na1 = 0.5\n\
+                     a2_s_per_m = 0.0\nv0_m_s = 1e-4\ndelta = 1.0\ntheta = 1.0\n";
+        let [brush, lugre] = [brush, lugre].map(|text| {
+            let model = ModelFile::parse("model.toml", text).unwrap();
+            with_numbers(&model, &baseline(&model, KNOWN_WITHIN).numbers, Some((2e4, 50.0))).unwrap()
+        });
+        assert_eq!((brush.kind, brush.get("k_u_n_per_m")), (ModelKind::Series, Some(2e4)));
+        assert_eq!(brush.to_toml(), lugre.to_toml());
+    }
 }
