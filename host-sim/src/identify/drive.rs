@@ -351,7 +351,7 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         ..Parameter::amplitude(name, sd)
     };
     let (v, own) = (scales.speed, scales.own);
-    let interval_s = logs.iter().map(|log| log.grid.interval_s()).fold(0.0, f64::max);
+    let interval_s = logs.iter().map(|log| log.grid.step_s).fold(0.0, f64::max);
     let acceleration = concat(&|log| log.acceleration.clone());
     let usual_acceleration = rms(&acceleration).max(1e-12);
     let mut base = vec![

@@ -1,20 +1,17 @@
-//! A log brought to an even time grid of about 1 ms.
+//! A log brought to an even time grid of 1 ms or more.
 //!
-//! The filters of a balance and the observer of the slip want even steps. Faster logs are averaged over whole groups of
-//! samples (nothing that is identified here is faster than the groups); slower or unevenly sampled ones are
-//! interpolated by cubics through the samples, and what the grid then shows too often is taken back in the effective
-//! sample size. Points of the grid that lie in a gap are marked and not used.
+//! The filters of a balance and the observer of the slip want even steps. Logs that are faster than 1 kHz are averaged over whole
+//! groups of samples (nothing that is identified here is faster than the groups); slower ones are taken as they are, since what
+//! an interpolation puts between samples is wrong wherever slip begins or a load steps. Unevenly sampled ones are
+//! interpolated by cubics through the samples, at their usual rate. Points of the grid that lie in a gap are marked and not used.
 
 use super::noise;
 use crate::files::log::slope;
 
-/// The step that is aimed at, s: the fastest of the effects, a ringing bridge, needs a few samples a period.
+/// Samples that are closer are averaged up to this, s: the fastest of the effects, a ringing bridge, needs a few points a period.
 pub const STEP_S: f64 = 1e-3;
 /// A distance between samples of more than so many median steps is a gap.
 const GAP_STEPS: f64 = 4.0;
-
-/// Samples for each point of the grid from which on they are about as close as its points.
-const LEAST_DENSITY: f64 = 0.8;
 
 /// How samples are brought to the grid.
 #[derive(Debug, Clone)]
@@ -25,8 +22,6 @@ pub struct Grid {
     pub time_s: Vec<f64>,
     /// Whether a point lies between samples and not in a gap.
     pub covered: Vec<bool>,
-    /// Samples of the log for each point of the grid, at most 1.
-    pub density: f64,
     /// Time of the log's first sample, s.
     pub start_s: f64,
     way: Way,
@@ -52,16 +47,15 @@ impl Grid {
             *steps.select_nth_unstable_by(m, f64::total_cmp).1
         };
         let group = (STEP_S / median + 0.25).floor().max(1.0) as usize;
-        let parts = (median / STEP_S - 0.25).ceil().max(1.0);
-        let step_s = median * group as f64 / parts;
+        let step_s = median * group as f64;
         // Rounded time stamps (three to six decimals) are even.
         let even = time_s.windows(2).all(|t| ((t[1] - t[0]) - median).abs() < 0.02 * median);
-        if even && parts == 1.0 {
+        if even {
             let n = time_s.len() / group;
             let centre = 0.5 * (group - 1) as f64 * median;
             let time_s = (0..n).map(|i| i as f64 * step_s + centre).collect();
             let way = if group == 1 { Way::Copy } else { Way::Mean(group) };
-            return Self { step_s, time_s, covered: vec![true; n], density: 1.0, start_s, way };
+            return Self { step_s, time_s, covered: vec![true; n], start_s, way };
         }
         let last_s = time_s.last().copied().unwrap_or(0.0) - start_s;
         let n = if time_s.len() < 2 { 0 } else { (last_s / step_s + 1e-6).floor() as usize + 1 };
@@ -77,13 +71,7 @@ impl Grid {
             covered.push(span <= GAP_STEPS * median.max(step_s));
             grid.push(i as f64 * step_s);
         }
-        let density = (time_s.len() as f64 / n.max(1) as f64).min(1.0);
-        Self { step_s, time_s: grid, covered, density, start_s, way: Way::Between(places) }
-    }
-
-    /// Time between samples of the log, or the step where that is longer, s.
-    pub fn interval_s(&self) -> f64 {
-        self.step_s / self.density
+        Self { step_s, time_s: grid, covered, start_s, way: Way::Between(places) }
     }
 
     /// Points of the grid.
@@ -127,21 +115,6 @@ impl Grid {
         }
     }
 
-    /// Whether samples are about as close as the grid's points, so that a log shows what swings from sample to sample.
-    pub fn is_dense(&self) -> bool {
-        self.density > LEAST_DENSITY
-    }
-
-    /// As [`Self::noise`] of a channel that may swing all the time. Where samples are further apart a signal fills its band, and
-    /// no part of the spectrum is noise alone.
-    pub fn white_noise(&self, values_on_grid: &[f64], values: &[f64]) -> f64 {
-        if self.is_dense() {
-            noise::white_deviation(values_on_grid)
-        } else {
-            self.noise(values_on_grid, values)
-        }
-    }
-
     /// Points of the grid that touch a marked sample of the log.
     pub fn touched(&self, marked: &[bool]) -> Vec<bool> {
         match &self.way {
@@ -157,16 +130,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fast_logs_are_averaged_slow_ones_interpolated_and_gaps_marked() {
+    fn fast_logs_are_averaged_slow_ones_taken_as_they_are_uneven_ones_interpolated_and_gaps_marked() {
         let at = |rate: f64, n: usize| (0..n).map(|i| i as f64 / rate).collect::<Vec<f64>>();
         let fast = Grid::new(&at(10_000.0, 1000));
-        assert_eq!((fast.len(), fast.density), (100, 1.0));
+        assert_eq!(fast.len(), 100);
         assert!((fast.step_s - 1e-3).abs() < 1e-12);
         let slow_time = at(200.0, 100);
         let slow = Grid::new(&slow_time);
-        assert!((slow.step_s - 1e-3).abs() < 1e-12 && (slow.density - 0.2).abs() < 0.01);
-        let line: Vec<f64> = slow_time.iter().map(|t| 3.0 * t - 1.0).collect();
-        for (t, x) in slow.time_s.iter().zip(slow.channel(&slow_time, &line)) {
+        assert!((slow.step_s - 5e-3).abs() < 1e-12);
+        assert_eq!(slow.channel(&slow_time, &slow_time), slow_time);
+        let uneven_time: Vec<f64> =
+            (0..100).map(|i| 2e-3 * (f64::from(i) + 0.3 * f64::from(i % 2))).collect();
+        let uneven = Grid::new(&uneven_time);
+        let line: Vec<f64> = uneven_time.iter().map(|t| 3.0 * t - 1.0).collect();
+        for (t, x) in uneven.time_s.iter().zip(uneven.channel(&uneven_time, &line)) {
             assert!((x - (3.0 * t - 1.0)).abs() < 1e-12);
         }
         let mut gap = at(1000.0, 500);

@@ -168,8 +168,8 @@ pub struct Ground {
     /// White noise of the sensor, N m, and what else is named: what makes a sample uncertain near a transition does so for all of
     /// a block.
     noise: Noise,
-    /// The most that makes a single sample uncertain, N m; `None` where points of the grid are no samples.
-    of_sample: Option<Noise>,
+    /// The most that makes a single sample uncertain, N m.
+    of_sample: Noise,
     /// Samples that are well known.
     rows: Vec<usize>,
     /// Samples in the blocks.
@@ -187,11 +187,9 @@ impl Ground {
     pub fn new(problem: &Problem<'_>, best: &Fit) -> Self {
         let limit = problem.well_known_nm();
         let deviation = problem.noise.deviation.clone();
-        let dense = problem.logs.iter().all(|log| log.grid.is_dense());
         let step_s = problem.logs.first().map_or(1e-3, |log| log.grid.step_s);
         let named = || (0..deviation.len()).map(|i| problem.noise.named(i));
-        // Points between samples share the samples' noise.
-        let of_log = |log: &ContactLog| vec![log.friction_noise_nm / log.grid.density.sqrt(); log.len()];
+        let of_log = |log: &ContactLog| vec![log.friction_noise_nm; log.len()];
         let white: Vec<f64> = problem.logs.iter().flat_map(of_log).collect();
         let signal = rms(&problem.measured().collect::<Vec<_>>()).max(1e-12);
         let loads = problem.logs.iter().flat_map(|log| log.load_n.iter().copied());
@@ -201,8 +199,8 @@ impl Ground {
             rows: (0..deviation.len())
                 .filter(|i| deviation[*i].max(problem.noise.named(*i)) < limit && best.r[*i] != 0.0)
                 .collect(),
-            of_sample: dense.then(|| Noise::white(named().map(|named| NAMED_WITHIN * named).collect())),
-            noise: Noise { repeated: if dense { repeated.collect() } else { Vec::new() }, white },
+            of_sample: Noise::white(named().map(|named| NAMED_WITHIN * named).collect()),
+            noise: Noise { repeated: repeated.collect(), white },
             signal,
             blocks: blocks(step_s),
             of_bridge: [0.0; 2],
@@ -230,8 +228,8 @@ impl Ground {
             structured(residual, noise, &self.rows, block, of_bridge)
         };
         let [long, short] = [0, 1].map(|at| of(noise, self.blocks[at], self.of_bridge[at]));
-        let each = self.of_sample.as_ref().map(|noise| of(noise, 1, self.of_bridge[1]));
-        [short].into_iter().chain(each).fold(long, |most, other| if other.0 > most.0 { other } else { most })
+        let each = of(&self.of_sample, 1, self.of_bridge[1]);
+        [short, each].into_iter().fold(long, |most, other| if other.0 > most.0 { other } else { most })
     }
 
     /// What each cause of a fit does, from the fits without it. What is named of a block stays in both rests: where a transition

@@ -114,8 +114,6 @@ mod tests {
     fn drive<'a>(root_m: &'a [f64], force_n: &'a [f64], load_n: &'a [f64], noise: (f64, f64)) -> Drive<'a> {
         Drive {
             step_s: STEP_S,
-            interval_s: STEP_S,
-            dense: true,
             root_m,
             load_n,
             force_n,

@@ -95,7 +95,7 @@ impl ContactLog {
 
         let logged_nm = on_grid(signals.friction_torque_nm);
         let logged_n = on_grid(signals.normal_force_n);
-        let friction_noise_nm = grid.white_noise(&logged_nm, signals.friction_torque_nm);
+        let friction_noise_nm = noise::white_deviation(&logged_nm);
         let normal_noise_n = grid.noise(&logged_n, signals.normal_force_n);
         let [friction_nm, normal_n] = [&logged_nm, &logged_n].map(|logged| mains::without(logged, step_s));
 
@@ -112,7 +112,7 @@ impl ContactLog {
         let smooth_nm = gaussian(&friction_nm, 2.0, 0);
         let friction_change_nm = local_maximum(&magnitudes(&gradient(&smooth_nm)), 2);
 
-        let ringing = if grid.is_dense() { Ringing::new(&friction_nm, friction_noise_nm) } else { None };
+        let ringing = Ringing::new(&friction_nm, friction_noise_nm);
         let mut usable = grid.covered.clone();
         // The observer's first state is a guess.
         usable.iter_mut().take(5).for_each(|u| *u = false);
@@ -157,7 +157,7 @@ impl ContactLog {
     /// Smoothed as far as it takes to tell slip from the channel's noise through a model's block.
     #[must_use]
     pub fn seen_through(mut self, numbers: &Numbers) -> Self {
-        if numbers.bristles_alone || !self.grid.is_dense() {
+        if numbers.bristles_alone {
             return self;
         }
         let noise_n = self.friction_noise_nm / self.radius_m;
@@ -165,7 +165,7 @@ impl ContactLog {
             * slip_noise_m_s(
                 noise_n,
                 (numbers.stiffness_n_per_m, numbers.damping_n_s_per_m),
-                self.grid.interval_s(),
+                self.grid.step_s,
             );
         let usual_m_s = rms(&self.root_speed_m_s);
         self.smoothing = Smoothing::new(&self.friction_nm, self.friction_noise_nm, told_m_s, usual_m_s);

@@ -43,7 +43,7 @@ const ROOT_MOTION_SOURCE: usize = 6;
 const OF_FORCE: std::ops::Range<usize> = 3..7;
 /// Samples of a cycle of slip and stick below which its jumps run into each other: each is uncertain over the smoothing's width
 /// and the two samples beside it, and there are two in a cycle.
-const SAMPLES_PER_CYCLE: f64 = 10.0;
+const SAMPLES_PER_CYCLE: usize = 10;
 /// The sensor's noise is known from the channel itself: its variance is at least this share of it.
 const LEAST_SENSOR: f64 = 0.2;
 /// Sources that are errors of the channel, from which the slip is observed too: the sensor's, motion between samples.
@@ -114,7 +114,7 @@ impl Noise {
                 predicted.iter().zip(&wide_change).map(|(p, m)| p.min(3.0 * m + floor)).collect();
             let wide_predicted = local_maximum(&predicted, 6);
             let slides: Vec<bool> = observed.sliding.iter().map(|s| *s > 0.5).collect();
-            resolved.extend(cycles_resolved(&slides, log.grid.interval_s() / log.grid.step_s));
+            resolved.extend(cycles_resolved(&slides));
             let transition = local_maximum(
                 &magnitude(gradient(&slides.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<f64>>())),
                 4,
@@ -147,7 +147,6 @@ impl Noise {
                 );
             }
         }
-        let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
         let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
         let certainties = prediction.observed.iter().flat_map(|observed| &observed.certainty);
         let certainty: Vec<f64> = certainties.copied().collect();
@@ -165,7 +164,7 @@ impl Noise {
             known,
             certainty,
             unresolved_s,
-            temper: 3.0 / density,
+            temper: 3.0,
             repeated: 1.0,
             factors: [1.0; SOURCES],
             ..Self::default()
@@ -367,8 +366,7 @@ impl Noise {
             shares.push(slow_share(&pull[from..from + log.len()], log.grid.step_s));
             from += log.len();
         }
-        let density = logs.iter().map(|log| log.grid.density).fold(1.0, f64::min);
-        self.temper = (shares.iter().sum::<f64>() / shares.len().max(1) as f64).max(1.0 / density);
+        self.temper = (shares.iter().sum::<f64>() / shares.len().max(1) as f64).max(1.0);
         self.repeated = 1.0;
         self.swinging = self
             .sources
@@ -379,11 +377,11 @@ impl Noise {
     }
 }
 
-/// Where cycles of slip and stick are long enough to be told from samples so many points apart. Faster ones are seen through what
+/// Where cycles of slip and stick are long enough to be told from samples. Faster ones are seen through what
 /// smooths the channel, and friction at a slip that is smoothed is wrong by the same in each of them.
-fn cycles_resolved(slides: &[bool], samples: f64) -> Vec<bool> {
+fn cycles_resolved(slides: &[bool]) -> Vec<bool> {
     // Over two such cycles, or a single breakaway that hesitates would count.
-    let reach = (SAMPLES_PER_CYCLE * samples).round() as usize;
+    let reach = SAMPLES_PER_CYCLE;
     let mut changes = vec![0usize];
     changes.extend(slides.windows(2).scan(0, |sum, pair| {
         *sum += usize::from(pair[0] != pair[1]);
@@ -474,12 +472,10 @@ mod tests {
             _ => i % 30 < 10,
         };
         let slides: Vec<bool> = (0..1200).map(slides).collect();
-        let resolved = cycles_resolved(&slides, 1.0);
+        let resolved = cycles_resolved(&slides);
         assert!(resolved[..170].iter().all(|resolved| *resolved));
         assert!(resolved[200..600].iter().all(|resolved| !resolved));
         assert!(resolved[640..].iter().all(|resolved| *resolved));
-        // Points between samples five times as far apart: cycles of six samples each.
-        assert!(cycles_resolved(&slides, 5.0)[700..1100].iter().all(|resolved| !resolved));
     }
 
     #[test]

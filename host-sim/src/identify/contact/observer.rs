@@ -42,10 +42,6 @@ const LEAST_LOAD: f64 = 2e-3;
 pub struct Drive<'a> {
     /// Step, s.
     pub step_s: f64,
-    /// Time between samples of the log, s: what lies between them is not measured.
-    pub interval_s: f64,
-    /// Whether samples are about as close as the points ([`crate::identify::grid::Grid::is_dense`]).
-    pub dense: bool,
     /// Way of the root, m.
     pub root_m: &'a [f64],
     /// Normal force, N.
@@ -277,8 +273,8 @@ fn steady_gain(added: f64) -> f64 {
 }
 
 /// The force's noise passes to the slip through a block's stiffness and damping: n/c, or n/(k h) where there is no damper.
-pub fn slip_noise_m_s(noise_n: f64, (stiffness, damping): (f64, f64), interval_s: f64) -> f64 {
-    noise_n / damping.max(stiffness * interval_s)
+pub fn slip_noise_m_s(noise_n: f64, (stiffness, damping): (f64, f64), step_s: f64) -> f64 {
+    noise_n / damping.max(stiffness * step_s)
 }
 
 /// Runs over a log.
@@ -301,7 +297,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
 
     let coulomb = contact.curve.at_speed();
     let least_load = least_load_n(drive);
-    let slip_noise = slip_noise_m_s(drive.noise.1, (k, c), drive.interval_s);
+    let slip_noise = slip_noise_m_s(drive.noise.1, (k, c), dt);
     let thresholds: Vec<f64> =
         widths().map(|(_, kept)| drive.slip_threshold_m_s.max(SLIP_NOISES * kept * slip_noise)).collect();
     let creep_noises: Vec<f64> = widths().map(|(_, kept)| drive.noise.0.hypot(kept * slip_noise)).collect();
@@ -318,9 +314,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let (mut held_m, mut held_branches_m) = (ways.block_m[0], ways.branches_m(0));
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
-    // Between samples that are far apart the force is not noise but a guess.
     let most = drive.smoothed.iter().copied().max().map_or(0, usize::from);
-    let own_noise: Option<Vec<OwnNoise>> = (drive.dense && c > 0.0).then(|| {
+    let own_noise: Option<Vec<OwnNoise>> = (c > 0.0).then(|| {
         let of_width = |(further, _)| OwnNoise::new(&block, contact, dt, drive.late, further);
         widths().take(most + 1).map(of_width).collect()
     });
@@ -505,8 +500,6 @@ mod tests {
             let contact = block(25_000.0, damping, Curve::new(|w| (0.6 - slope * (w - speed)).max(0.1)));
             let drive = Drive {
                 step_s: STEP_S,
-                interval_s: 1.003 * STEP_S,
-                dense: true,
                 root_m: &root_m,
                 load_n: &loads,
                 force_n: &seen_n,
@@ -551,8 +544,6 @@ mod tests {
             let at_end: Vec<i8> = acts_n.iter().map(|f| i8::from(*f > END_N)).collect();
             let drive = Drive {
                 step_s: STEP_S,
-                interval_s: STEP_S,
-                dense: true,
                 root_m: &acts_n.iter().map(|f| f / STIFFNESS_N_PER_M).collect::<Vec<_>>(),
                 load_n: &vec![50.0; acts_n.len()],
                 force_n: &acts_n
@@ -582,39 +573,5 @@ mod tests {
             let late = off_n(&acts_n[from..], true, stands_in);
             assert!(late < 0.3, "{from}: {late}");
         }
-    }
-
-    /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N every 10 ms and interpolated.
-    #[test]
-    fn slip_is_seen_between_samples_that_are_far_apart() {
-        const STEP_S: f64 = 1e-3;
-        let contact = block(2e4, 0.0, Curve::new(|_| 0.5));
-        let mut noise = White::new(1);
-        let samples: Vec<f64> = (0..102).map(|_| 5.0 + 0.15 * noise.next()).collect();
-        let force_n: Vec<f64> = (0..1000)
-            .map(|i| samples[i / 10] + (i % 10) as f64 / 10.0 * (samples[i / 10 + 1] - samples[i / 10]))
-            .collect();
-        let root_m: Vec<f64> = (0..1000).map(|i| 0.01 * STEP_S * i as f64).collect();
-        let sliding = |interval_s: f64| {
-            let drive = Drive {
-                step_s: STEP_S,
-                interval_s,
-                dense: interval_s < 2.0 * STEP_S,
-                root_m: &root_m,
-                load_n: &[10.0; 1000],
-                force_n: &force_n,
-                ends: None,
-                factor: None,
-                slip_threshold_m_s: 1e-4,
-                late: 0.0,
-                smoothed: &[],
-                noise: (1e-5, 0.15),
-            };
-            let seen = observe(&contact, &drive).sliding;
-            seen.iter().sum::<f64>() / seen.len() as f64
-        };
-        assert!(sliding(0.01) > 0.95, "{}", sliding(0.01));
-        // Were each point a sample of its own, its noise would hide the slip.
-        assert!(sliding(STEP_S) < 0.05, "{}", sliding(STEP_S));
     }
 }

@@ -274,8 +274,7 @@ impl<'a> Problem<'a> {
             stiffness_n_per_m: k,
             damping_n_s_per_m: c,
             bristles_n_per_m: n.bristles_n_per_m,
-            // Between samples far apart the root's way is a guess, and bristles that are followed in open loop need it.
-            bristles_alone: has_no_block && self.logs.iter().all(|log| log.grid.is_dense()),
+            bristles_alone: has_no_block,
             // They stand beside a block.
             branches: if has_no_block { [(0.0, 1.0); 3] } else { change.branches },
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
@@ -324,8 +323,6 @@ impl<'a> Problem<'a> {
             let factor = change.log_factor.as_ref().map(|m| exponentials(&m[at]));
             let drive = Drive {
                 step_s: log.grid.step_s,
-                interval_s: log.grid.interval_s(),
-                dense: log.grid.is_dense(),
                 root_m: change.root_m.as_ref().map_or(&log.root_m, |root| &root[at]),
                 load_n: &load_n,
                 force_n: &[],

@@ -43,7 +43,7 @@ impl Effect for RingResonance {
         let damped = (0..42).map(|i| (22.0 * 1.06f64.powi(i), 0.06));
         let rings = peaks_hz(view).flat_map(|hz| [0.004, 0.012].map(|zeta| (hz, zeta)));
         // Faster than half of the sampling rate no mode is seen.
-        let fastest_hz = view.logs.iter().map(|log| 0.5 / log.grid.interval_s()).fold(f64::INFINITY, f64::min);
+        let fastest_hz = view.logs.iter().map(|log| 0.5 / log.grid.step_s).fold(f64::INFINITY, f64::min);
         let seen = damped.chain(rings).filter(|(hz, _)| *hz < fastest_hz);
         let starts = seen.map(|(hz, zeta): (f64, f64)| vec![hz.ln(), zeta.ln()]).collect();
         vec![ContactTerm::any(self.id(), parameters, Starts::BestOf(starts, 3), |p, change| {
