@@ -16,6 +16,9 @@ const BENDS: [f64; 3] = [0.1, 0.3, 10.0];
 /// Half periods in the longest log up to which a drift's wandering is told: what changes faster is none.
 const WANDERING: usize = 4;
 
+/// A gain drifts less: a foil's factor by a percent in 100 K, an amplifier's by less; a tenth is a bridge that is coming loose.
+const GAIN: f64 = 0.1;
+
 /// What a drift does over time, given as a share of the longest log, and from nothing where a log begins.
 #[derive(Debug, Clone, Copy)]
 enum Course {
@@ -58,13 +61,14 @@ impl Course {
         }
     }
 
-    /// The parameters of its parts, for a zero and for a gain, each so large at most.
+    /// The parameters of its parts, for a zero and for a gain: a zero may drift by all of what a bridge usually shows, which is
+    /// `size`.
     fn parameters(self, of: &str, kinds: [&str; 2], size: f64) -> Vec<Parameter> {
-        let named = |kind: &str| {
+        let named = |(kind, size): (&str, f64)| {
             let part = |(name, share)| Parameter::amplitude(format!("{of}_{kind}_{name}"), share * size);
             self.parts().into_iter().map(part).collect::<Vec<_>>()
         };
-        kinds.into_iter().flat_map(named).collect()
+        kinds.into_iter().zip([size, GAIN * size]).flat_map(named).collect()
     }
 
     /// Its columns, for a zero and for a gain: `column` makes one of what a part does over time.
