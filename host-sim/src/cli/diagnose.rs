@@ -70,7 +70,7 @@ impl Diagnose {
         let rig = RigFile::read_or_assumed(self.rig.as_deref(), &overrides.rig)?;
         let model = ModelFile::read_or_assumed(self.model.as_deref(), &overrides.model)?;
         let read = |paths: &[PathBuf]| {
-            paths.iter().map(|path| Log::read(path).map(Log::as_sampled)).collect::<Result<Vec<_>, _>>()
+            paths.iter().map(|path| Log::read_as_sampled(path)).collect::<Result<Vec<_>, _>>()
         };
         let (train, holdout) = (read(&self.train)?, read(&self.holdout)?);
         let mut output = OutputDir::new(&self.out)?;

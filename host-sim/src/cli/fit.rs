@@ -209,11 +209,7 @@ impl Part {
 impl Fit {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), InputError> {
-        let logs = self
-            .train
-            .iter()
-            .map(|path| Log::read(path).map(Log::as_sampled))
-            .collect::<Result<Vec<_>, _>>()?;
+        let logs = self.train.iter().map(|path| Log::read_as_sampled(path)).collect::<Result<Vec<_>, _>>()?;
         let kind = same_kind(&logs)?;
         match kind {
             LogKind::Contact => self.contact(&logs),

@@ -105,7 +105,7 @@ impl Predict {
         }
         let rig = RigFile::read_or_assumed(self.rig.as_deref(), &overrides.rig)?;
         let model = ModelFile::read(&self.model, &overrides.model)?;
-        let log = Log::read(&self.log)?.as_sampled();
+        let log = Log::read_as_sampled(&self.log)?;
         let signals = log.contact()?;
         let output = OutputDir::new(&self.out)?;
 
@@ -165,7 +165,7 @@ impl Predict {
     }
 
     fn drive(&self, model: &DriveModel) -> Result<(), InputError> {
-        let log = Log::read(&self.log)?.as_sampled();
+        let log = Log::read_as_sampled(&self.log)?;
         let prediction = predict_drive_log(model, &log)?;
         let output = OutputDir::new(&self.out)?;
         let (mut table, main) = (Log::default(), prediction.main);

@@ -121,6 +121,11 @@ impl Log {
         Ok(log)
     }
 
+    /// Reads a log as [`Self::read`] does, and takes its samples at the times at which they were taken ([`Self::as_sampled`]).
+    pub fn read_as_sampled(path: &Path) -> Result<Self, InputError> {
+        Self::read(path).map(Self::as_sampled)
+    }
+
     /// Parses and checks a CSV text; `source` is the name that errors will give.
     pub fn parse_csv(source: &str, bytes: &[u8]) -> Result<Self, InputError> {
         let log = log_csv::parse(source, bytes)?;
@@ -359,6 +364,16 @@ pub fn unwrapped(angle_rad: &[f64]) -> Vec<f64> {
         angle + turns * TAU
     };
     angle_rad.iter().map(unwrap).collect()
+}
+
+/// Median of the steps; `None` if time stands still or goes back.
+pub(crate) fn median_step(time_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.is_empty() || steps.iter().any(|step| !step.is_finite() || *step <= 0.0) {
+        return None;
+    }
+    let middle = steps.len() / 2;
+    Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Slope at each sample of the parabola through it and its neighbours; one-sided at the ends.

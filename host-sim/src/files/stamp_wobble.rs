@@ -5,19 +5,22 @@
 //! Δx = ẋ T where it was not. The slope of what is missing, over ẋ w, is 1 for stamps that are right and 0 for samples that are even.
 //! Second differences take the motion itself out of both.
 
-use super::log::slope;
+use super::log::{median_step, slope};
 
 /// A step that is off its whole number of nominal steps by as much as this has a wobble that stamps of even rounding have not.
 const WOBBLE: f64 = 0.01;
 /// The slope is below this where samples are even: half way.
 const EVEN: f64 = 0.5;
-/// … and is known to this.
+/// … and is known to this: right stamps are then five deviations from it.
 const KNOWN: f64 = 0.1;
 /// Stamps that go further from an even clock than so many nominal steps do more than wobble.
 const FURTHEST: f64 = 1.0;
-/// Share of a stamp's wobble that the clock by which missing rows are counted takes over.
-const FOLLOWS: f64 = 0.05;
-/// Samples over which the speed at a step is taken.
+/// Steps that are off the median one by less than this share of it are steps of no missing row: somewhat more than a half.
+const USUAL: f64 = 0.55;
+/// Shares of a stamp's wobble that the clock by which missing rows are counted takes over, where the step is known to a thousandth and
+/// once it is known to a ten-thousandth: such a step puts the clock off by a fiftieth of a step, and of the wobble √(f/2) is in it.
+const FOLLOWS: [f64; 2] = [0.05, 0.005];
+/// Samples to either side over which the speed at a step is taken: it swings more slowly, and its noise is a third of one step's.
 const SPEED_OVER: usize = 4;
 
 /// Samples that are even though their stamps are not.
@@ -37,17 +40,15 @@ pub(super) struct EvenSamples {
 ///
 /// `time_s` rises; `position` is an angle without jumps, or a way, at each.
 pub(super) fn even_samples(time_s: &[f64], position: &[f64]) -> Option<EvenSamples> {
-    let steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
-    if steps.len() < 4 * SPEED_OVER {
-        return None;
-    }
-    let mut sorted = steps.clone();
-    let median = *sorted.select_nth_unstable_by(steps.len() / 2, f64::total_cmp).1;
-    // Stamps that are rounded to whole milliseconds have two steps and no median between them.
-    let usual: Vec<f64> = steps.iter().copied().filter(|step| *step < 1.5 * median).collect();
-    // Counted once more with the step that the first count shows.
-    let (_, shown_s) = line(&counted(time_s, usual.iter().sum::<f64>() / usual.len() as f64), time_s);
-    let at = counted(time_s, shown_s);
+    let median = median_step(time_s).filter(|_| time_s.len() > 4 * SPEED_OVER)?;
+    // Stamps that are rounded to whole milliseconds have two steps and no median between them: one is half of the other at most. As far
+    // to either side, so that a wobble does not shift the mean.
+    let steps = time_s.windows(2).map(|t| t[1] - t[0]);
+    let usual: Vec<f64> = steps.filter(|step| (step - median).abs() < USUAL * median).collect();
+    let roughly = (time_s[0], usual.iter().sum::<f64>() / usual.len() as f64);
+    // Counted once more with the line that the first count shows.
+    let closely = line(&counted(time_s, roughly, FOLLOWS[0]), time_s);
+    let at = counted(time_s, closely, FOLLOWS[1]);
     let counts: Vec<f64> = at.windows(2).map(|k| k[1] - k[0]).collect();
     let (start_s, step_s) = line(&at, time_s);
     let even: Vec<f64> = at.iter().map(|k| start_s + k * step_s).collect();
@@ -61,24 +62,24 @@ pub(super) fn even_samples(time_s: &[f64], position: &[f64]) -> Option<EvenSampl
 }
 
 /// Nominal steps up to each stamp, rows that are missing counted: by a clock that follows the stamps slowly, so that a wobble may be
-/// up to half a step.
-fn counted(time_s: &[f64], step_s: f64) -> Vec<f64> {
-    let (mut clock_s, mut count) = (time_s[0], 0.0);
+/// nearly half a step.
+fn counted(time_s: &[f64], (start_s, step_s): (f64, f64), follows: f64) -> Vec<f64> {
+    let (mut clock_s, mut count) = (start_s, 0.0);
     let next = |stamp_s: &f64| {
-        let steps = ((stamp_s - clock_s) / step_s).round().max(if count > 0.0 { 1.0 } else { 0.0 });
+        let steps = ((stamp_s - clock_s) / step_s).round().max(1.0);
         let even_s = clock_s + steps * step_s;
-        clock_s = even_s + FOLLOWS * (stamp_s - even_s);
+        clock_s = even_s + follows * (stamp_s - even_s);
         count += steps;
         count
     };
-    time_s.iter().map(next).collect()
+    std::iter::once(0.0).chain(time_s[1..].iter().map(next)).collect()
 }
 
 /// Share of the stamps' wobble that the position shows, with its standard error.
 fn shown(even_s: &[f64], off_s: &[f64], position: &[f64], counts: &[f64]) -> Option<(f64, f64)> {
     let speed = slope(even_s, position);
     let second = |x: &dyn Fn(usize) -> f64, i: usize| x(i) - 0.5 * (x(i - 1) + x(i + 1));
-    let (mut square, mut product, mut pairs) = (0.0, 0.0, Vec::new());
+    let mut pairs = Vec::new();
     for i in SPEED_OVER..position.len() - 1 - SPEED_OVER {
         let near = i - SPEED_OVER..=i + SPEED_OVER;
         if counts[near.clone()].iter().any(|count| *count > 1.0) {
@@ -86,12 +87,10 @@ fn shown(even_s: &[f64], off_s: &[f64], position: &[f64], counts: &[f64]) -> Opt
         }
         let mean = speed[near.clone()].iter().sum::<f64>() / near.count() as f64;
         let moved = second(&|j| position[j + 1] - position[j], i);
-        let stamped = mean * second(&|j| off_s[j + 1] - off_s[j], i);
-        square += stamped * stamped;
-        product += moved * stamped;
-        pairs.push((moved, stamped));
+        pairs.push((moved, mean * second(&|j| off_s[j + 1] - off_s[j], i)));
     }
-    let share = product / square;
+    let square = pairs.iter().map(|(_, stamped)| stamped * stamped).sum::<f64>();
+    let share = pairs.iter().map(|(moved, stamped)| moved * stamped).sum::<f64>() / square;
     // What is missing and the wobble are both differences of neighbours, so that their products go together over several: the sum's
     // variance is that of sums over stretches that are longer.
     let stretches = pairs.chunks_exact(4 * SPEED_OVER);
@@ -139,7 +138,7 @@ mod tests {
 
     #[test]
     fn stamps_that_wobble_where_the_samples_do_not_are_evened() {
-        for wobble in [0.05, 0.2, 0.3] {
+        for wobble in [0.05, 0.2, 0.4] {
             let (stamps, angles, nominal) = log(wobble, 0.0);
             let found = even_samples(&stamps, &angles).expect("the samples are even");
             for (found, nominal) in found.time_s.iter().zip(&nominal) {

@@ -6,7 +6,7 @@
 //! interpolated by cubics through the samples, at their usual rate. Points of the grid that lie in a gap are marked and not used.
 
 use super::noise;
-use crate::files::log::slope;
+use crate::files::log::{median_step, slope};
 
 /// Samples that are closer are averaged up to this, s: the fastest of the effects, a ringing bridge, needs a few points a period.
 pub const STEP_S: f64 = 1e-3;
@@ -39,13 +39,7 @@ impl Grid {
     /// The grid for these time stamps, which rise.
     pub fn new(time_s: &[f64]) -> Self {
         let start_s = time_s.first().copied().unwrap_or(0.0);
-        let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
-        let median = if steps.is_empty() {
-            STEP_S
-        } else {
-            let m = steps.len() / 2;
-            *steps.select_nth_unstable_by(m, f64::total_cmp).1
-        };
+        let median = median_step(time_s).unwrap_or(STEP_S);
         let group = (STEP_S / median + 0.25).floor().max(1.0) as usize;
         let step_s = median * group as f64;
         // Rounded time stamps (three to six decimals) are even.

@@ -3,6 +3,8 @@
 //! Uneven samples are interpolated onto the grid of their median step: linearly, which is below the
 //! noise where steps differ by little. A record whose times are even to 1 % of a step is taken as it is.
 
+use crate::files::log::median_step;
+
 /// Effort in, position out, evenly sampled. Newtons and metres, or newton metres and radians.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DriveRecord {
@@ -91,16 +93,6 @@ impl DriveRecord {
     pub fn rate_hz(&self) -> f64 {
         1.0 / self.step_s
     }
-}
-
-/// Median of the steps; `None` if time stands still or goes back.
-pub fn median_step(time_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() || steps.iter().any(|step| !step.is_finite() || *step <= 0.0) {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Linear interpolation at rising times; beyond the ends the end value.
