@@ -188,28 +188,14 @@ fn with_numbers(
 ) -> Result<ModelFile, InputError> {
     let theta = model.get("theta").unwrap_or(1.0);
     let n = numbers;
-    if let (Some((k, c)), ModelKind::Brush) = (block, model.kind) {
-        let values = [
-            ("sigma0_n_per_m", n.stiffness_n_per_m),
-            ("sigma1_n_s_per_m", n.damping_n_s_per_m),
-            ("a0", n.a0),
-            ("a1", n.a1),
-            ("a2_s_per_m", n.a2_s_per_m),
-            ("v0_m_s", n.v0_m_s),
-            ("delta", n.delta),
-            ("theta", theta),
-            ("k_u_n_per_m", k),
-            ("c_u_n_s_per_m", c),
-        ];
-        return ModelFile::new("model-extended.toml", ModelKind::Series, &values);
-    }
     let stiffness = if has_block(model) { "k_u_n_per_m" } else { "sigma0_n_per_m" };
     let damping = if has_block(model) { "c_u_n_s_per_m" } else { "sigma1_n_s_per_m" };
-    let fitted = [
+    let mut fitted = vec![
         ("a0", n.a0 / theta),
         ("a1", n.a1 / theta),
         ("v0_m_s", n.v0_m_s),
         ("delta", n.delta.clamp(0.1, 4.0)),
+        ("theta", theta),
         ("a2_s_per_m", n.a2_s_per_m),
         (stiffness, n.stiffness_n_per_m),
         (damping, n.damping_n_s_per_m),
@@ -217,19 +203,12 @@ fn with_numbers(
         ("mu_s", n.a0 + n.a1),
         ("c_n_per_m", n.stiffness_n_per_m),
     ];
-    let mut values: Vec<(&str, f64)> = model
-        .parameters()
-        .map(|(name, value)| {
-            (name, fitted.iter().find(|(own, _)| *own == name).map_or(value, |(_, fitted)| *fitted))
-        })
-        .collect();
-    let kind = match block {
-        Some((k, c)) => {
-            values.extend([("k_u_n_per_m", k), ("c_u_n_s_per_m", c)]);
-            ModelKind::Series
-        }
-        None => model.kind,
-    };
+    fitted.extend(block.into_iter().flat_map(|(k, c)| [("k_u_n_per_m", k), ("c_u_n_s_per_m", c)]));
+    let kind = if block.is_some() { ModelKind::Series } else { model.kind };
+    let value =
+        |name| fitted.iter().find(|(own, _)| *own == name).map(|(_, fitted)| *fitted).or(model.get(name));
+    let names = kind.parameters().iter().map(|spec| spec.name);
+    let values: Vec<(&str, f64)> = names.filter_map(|name| Some((name, value(name)?))).collect();
     ModelFile::new("model-extended.toml", kind, &values)
 }
 
