@@ -377,8 +377,8 @@ impl Noise {
     }
 }
 
-/// Where cycles of slip and stick are long enough to be told from samples. Faster ones are seen through what
-/// smooths the channel, and friction at a slip that is smoothed is wrong by the same in each of them.
+/// Where cycles of slip and stick are long enough to be told from samples. Faster ones are seen through what smooths the channel,
+/// and friction at a slip that is smoothed is wrong by the same in each of them.
 fn cycles_resolved(slides: &[bool]) -> Vec<bool> {
     // Over two such cycles, or a single breakaway that hesitates would count.
     let reach = SAMPLES_PER_CYCLE;

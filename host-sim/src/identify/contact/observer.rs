@@ -574,4 +574,32 @@ mod tests {
             assert!(late < 0.3, "{from}: {late}");
         }
     }
+
+    /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N.
+    #[test]
+    fn slip_is_seen_from_samples_that_are_far_apart() {
+        let contact = block(2e4, 0.0, Curve::new(|_| 0.5));
+        let mut noise = White::new(1);
+        let force_n: Vec<f64> = (0..1000).map(|_| 5.0 + 0.15 * noise.next()).collect();
+        let sliding = |step_s: f64| {
+            let root_m: Vec<f64> = (0..1000).map(|i| 0.01 * step_s * f64::from(i)).collect();
+            let drive = Drive {
+                step_s,
+                root_m: &root_m,
+                load_n: &[10.0; 1000],
+                force_n: &force_n,
+                ends: None,
+                factor: None,
+                slip_threshold_m_s: 1e-4,
+                late: 0.0,
+                smoothed: &[],
+                noise: (1e-5, 0.15),
+            };
+            let seen = observe(&contact, &drive).sliding;
+            seen.iter().sum::<f64>() / seen.len() as f64
+        };
+        assert!(sliding(0.01) > 0.95, "{}", sliding(0.01));
+        // From samples of a millisecond noise hides the slip.
+        assert!(sliding(1e-3) < 0.05, "{}", sliding(1e-3));
+    }
 }
