@@ -200,7 +200,7 @@ fn with_numbers(
         (stiffness, n.stiffness_n_per_m),
         (damping, n.damping_n_s_per_m),
         ("mu_c", n.a0),
-        ("mu_s", n.a0 + n.a1),
+        ("mu_s", n.a0 + n.a1.max(0.0)),
         ("c_n_per_m", n.stiffness_n_per_m),
     ];
     fitted.extend(block.into_iter().flat_map(|(k, c)| [("k_u_n_per_m", k), ("c_u_n_s_per_m", c)]));

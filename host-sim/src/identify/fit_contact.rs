@@ -143,6 +143,9 @@ fn starts(baseline: &Baseline, begin: Begin) -> Vec<Vec<f64>> {
 /// Gauss–Newton with fresh slopes until it gains nothing.
 fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, progress: &(dyn Fn() + Sync)) -> Fit {
     let mut best = problem.fit(&[], start, STEPS, None);
+    if let Some(better) = problem.better_static(&best) {
+        best = problem.fit(&[], better, STEPS, None);
+    }
     for _ in 1..rounds {
         progress();
         let next = problem.fit(&[], best.p.clone(), STEPS, None);

@@ -42,7 +42,8 @@ pub fn default_free(model: &ModelFile) -> Vec<String> {
 fn role(name: &str, block: bool) -> Option<(Role, f64)> {
     match name {
         "a0" | "mu_c" => Some((Role::A0, WITHIN)),
-        "a1" | "mu_s" => Some((Role::A1, WITHIN)),
+        "a1" => Some((Role::A1, WITHIN)),
+        "mu_s" => Some((Role::Static, WITHIN)),
         "v0_m_s" => Some((Role::V0, WITHIN)),
         "delta" => Some((Role::Delta, WITHIN_EXPONENT)),
         "theta" => Some((Role::Factor, WITHIN)),
@@ -91,6 +92,7 @@ pub fn baseline_of(model: &ModelFile, rig: &RigFile, free: &[String]) -> Result<
         let value = match role {
             Role::A0 => numbers.a0,
             Role::A1 => numbers.a1,
+            Role::Static => numbers.a0 + numbers.a1,
             Role::V0 => numbers.v0_m_s,
             Role::Delta => numbers.delta,
             Role::A2 => numbers.a2_s_per_m,
@@ -119,7 +121,7 @@ fn value(model: &ModelFile, baseline: &Baseline, p: &[f64], name: &str) -> f64 {
         "a1" => numbers.a1 / theta,
         "theta" => theta,
         "mu_c" => numbers.a0,
-        "mu_s" => numbers.a0 + numbers.a1,
+        "mu_s" => numbers.a0 + numbers.a1.max(0.0),
         "v0_m_s" => numbers.v0_m_s,
         "delta" => numbers.delta,
         "a2_s_per_m" => numbers.a2_s_per_m,

@@ -32,6 +32,7 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             damping_n_s_per_m: 0.0,
             bristles_n_per_m: f64::INFINITY,
             bristles_alone: false,
+            slips_on: true,
             late_ms: 0.0,
             friction_zero_nm: 0.0,
             normal_zero_n: 0.0,
@@ -47,6 +48,7 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
             damping_n_s_per_m: if block { get("c_u_n_s_per_m") } else { get("sigma1_n_s_per_m") },
             bristles_n_per_m: if block { get("sigma0_n_per_m") } else { f64::INFINITY },
             bristles_alone: !block,
+            slips_on: false,
             late_ms: 0.0,
             friction_zero_nm: 0.0,
             normal_zero_n: 0.0,
@@ -62,8 +64,11 @@ pub fn baseline(model: &ModelFile, within: f64) -> Baseline {
         }
     };
     add(Role::A0, if brush { "mu_c" } else { "a0" }, numbers.a0, within);
-    add(Role::A1, if brush { "mu_s" } else { "a1" }, numbers.a1, within);
-    if !brush {
+    if brush {
+        // Each of the two is known so well, and their difference as badly as that leaves it.
+        add(Role::Static, "mu_s", get("mu_s"), within);
+    } else {
+        add(Role::A1, "a1", numbers.a1, within);
         add(Role::V0, "v0_m_s", numbers.v0_m_s, within);
         add(Role::Delta, "delta", numbers.delta, 0.5 * within);
         add(Role::A2, "a2_s_per_m", numbers.a2_s_per_m, 2.0 * within);

@@ -105,6 +105,7 @@ mod tests {
             damping_n_s_per_m: 0.0,
             bristles_n_per_m: f64::INFINITY,
             bristles_alone,
+            slips_on: false,
             branches: [(0.0, 1.0); 3],
             viscous: (0.0, 0.0),
             ageing: None,

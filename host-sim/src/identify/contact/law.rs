@@ -124,6 +124,8 @@ pub struct Contact {
     pub bristles_n_per_m: f64,
     /// Whether the stiffness is that of bristles which follow the root (LuGre), and not of a block that slips as a whole.
     pub bristles_alone: bool,
+    /// Whether what slips does so until the motion reverses or stops, however slow it is (brush with reset).
+    pub slips_on: bool,
     /// Maxwell branches beside it: stiffness, N/m, and relaxation time, s.
     pub branches: [(f64, f64); 3],
     /// Friction per slip speed: per load, s/m, and whatever the load, N s/m.

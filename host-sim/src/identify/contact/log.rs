@@ -7,7 +7,7 @@ use super::problem::Numbers;
 use super::ringing::Ringing;
 use super::smoothing::{OBSERVED_OVER, Smoothing};
 use crate::files::log::{Log, unwrapped};
-use crate::files::rig_file::RigFile;
+use crate::files::rig_file::{Bridge, RigFile};
 use crate::files::signal::Signal;
 use crate::identify::filters::{gaussian, gradient, local_maximum, rms, shifted, smoothed_flat};
 use crate::identify::grid::Grid;
@@ -71,6 +71,9 @@ pub struct ContactLog {
     pub normal_noise_n: f64,
     /// Noise of the root's speed from sample to sample, m/s.
     pub speed_noise_m_s: f64,
+    /// What is left of a jump as ringing that samples are too far apart to show: its RMS at the jump over the jump, and the share
+    /// that is left a sample on. `None` where they show it.
+    pub unseen_ringing: Option<(f64, f64)>,
     /// How late the friction channel is by the rig file, samples.
     pub friction_late: f64,
     /// What the friction channel swings with faster than a model can follow, where samples are regular enough to show it.
@@ -121,6 +124,7 @@ impl ContactLog {
             root_speed_m_s: gaussian(&speed, 3.0, 0),
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
             smoothing: Smoothing::default(),
+            unseen_ringing: unseen_ringing(&rig.friction_bridge, step_s),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
             speed_noise_m_s: radius_m * speed_noise,
@@ -237,6 +241,14 @@ impl ContactLog {
     pub fn is_empty(&self) -> bool {
         self.grid.is_empty()
     }
+}
+
+/// Of a mode above half the rate of the samples, behind the low-pass.
+fn unseen_ringing(bridge: &Bridge, step_s: f64) -> Option<(f64, f64)> {
+    let mode = bridge.mode.filter(|mode| mode.mode_hz * step_s > 0.5)?;
+    let passes = bridge.lowpass_hz.map_or(1.0, |hz| 1.0 / (1.0 + (mode.mode_hz / hz).powi(4)).sqrt());
+    let decay = mode.damping_ratio * std::f64::consts::TAU * mode.mode_hz;
+    Some((passes * std::f64::consts::FRAC_1_SQRT_2, (-decay * step_s).exp()))
 }
 
 fn magnitudes(values: &[f64]) -> Vec<f64> {

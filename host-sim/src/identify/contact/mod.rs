@@ -9,6 +9,7 @@ pub mod log;
 pub(in crate::identify) mod noise;
 pub mod observer;
 pub mod problem;
+mod reset;
 pub mod ringing;
 pub mod search;
 pub mod smoothing;

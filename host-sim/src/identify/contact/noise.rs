@@ -10,7 +10,7 @@
 //! | form of the model | 0.4 % of the force |
 //! | noise of the slip speed | through g′, where the tip slips |
 //! | noise of the root's motion | through the stiffness, where it sticks; of bristles without a block [`certainty`](super::observer::Observed::certainty) has it, and this only what is named |
-//! | transitions | 3 % of the load near a change between slip and stick |
+//! | transitions | 3 % of the load near a change between slip and stick; 0.3 of the whole fall from static to sliding friction where nothing slows it (brush) |
 //!
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
 //! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides. Nor is the channel's 1/f
@@ -100,6 +100,9 @@ impl Noise {
     /// Before anything is fitted.
     pub fn new(logs: &[ContactLog], contact: &Contact, prediction: &Prediction) -> Self {
         let (curve, stiffness_n_per_m) = (&contact.curve, contact.stiffness_n_per_m);
+        // A block falls within some samples; what has none falls within one, at any time in it.
+        let fall = if contact.slips_on { curve.at(0.0) - curve.at_speed() } else { 0.0 };
+        let transition_of_load = TRANSITION.max(BETWEEN_SAMPLES * fall);
         let (mut sources, mut resolved) = (Vec::new(), Vec::new());
         let mut from = 0;
         for (log, observed) in logs.iter().zip(&prediction.observed) {
@@ -122,12 +125,17 @@ impl Noise {
             let slip_noise =
                 log.speed_noise_m_s.max(1e-3 * crate::identify::filters::rms(&log.root_speed_m_s));
             let radius = log.radius_m;
+            let (struck, kept) = log.unseen_ringing.filter(|_| contact.slips_on).unwrap_or_default();
+            let mut rings = 0.0;
             for i in 0..log.len() {
                 let changed = wide_change[i].min(2.0 * wide_predicted[i] + floor);
                 let sliding = observed.sliding[i] > 0.5;
                 let slope =
                     if sliding { curve.slope(observed.slip_m_s[i].abs().max(3.0 * slip_noise)) } else { 0.0 };
                 let load = log.load_n[i].max(0.0);
+                let breaks = slides[i] && !slides[i.saturating_sub(1)];
+                rings = if breaks { struck } else { kept * rings };
+                let near = if transition[i] > 0.0 { transition_of_load } else { 0.0 };
                 sources.push(
                     [
                         log.friction_noise_nm,
@@ -141,7 +149,7 @@ impl Noise {
                         } else {
                             2.0 * radius * stiffness_n_per_m * log.speed_noise_m_s * log.grid.step_s
                         },
-                        if transition[i] > 0.0 { TRANSITION * radius * load } else { 0.0 },
+                        near.hypot(fall * rings) * radius * load,
                     ]
                     .map(|n| n * n),
                 );

@@ -8,7 +8,8 @@
 //! the observed slip, F = sgn(w) (F_N g(|w|) e^m + F_N a2 |w| + film); where it sticks F = k u + c V + branches, u integrated from
 //! the motion with a weak pull to the measurement, held below breakaway. The two are blended smoothly, since a switch
 //! makes the likelihood rough: s is a product of sigmoids in the slip speed, in its ratio to the root's speed and in the
-//! force's size and sign. Bristles without a block need none of this (`bristles.rs`).
+//! force's size and sign. Bristles without a block need none of this (`bristles.rs`); a brush slips on where this sees none
+//! (`reset.rs`).
 //!
 //! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
 //!
@@ -18,6 +19,7 @@
 //! Left out: what the force did between samples; slip that begins and ends within one.
 
 use super::law::Contact;
+use super::reset::Loose;
 use super::smoothing::{OBSERVED_OVER, widths};
 use crate::identify::filters::{gaussian, shifted, smoothed_flat};
 use nalgebra::{DMatrix, SMatrix, SVector};
@@ -25,9 +27,9 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 /// Slip is faster than so many deviations of its noise.
 pub const SLIP_NOISES: f64 = 4.0;
 /// Width of the sigmoids, relative to their threshold.
-const WIDTH: f64 = 0.05;
+pub(super) const WIDTH: f64 = 0.05;
 /// Slip is more than this share of the root's speed: below it the block follows the root.
-const LEAST_SHARE: f64 = 0.5;
+pub(super) const LEAST_SHARE: f64 = 0.5;
 /// In slip the force is more than this share of F_N g(∞).
 const LEAST_FORCE: f64 = 0.3;
 /// Softness of the limit at breakaway, relative.
@@ -124,7 +126,7 @@ pub(super) fn least_load_n(drive: &Drive<'_>) -> f64 {
 const SATURATED: f64 = 15.0;
 
 #[inline]
-fn sigmoid(x: f64) -> f64 {
+pub(super) fn sigmoid(x: f64) -> f64 {
     if x > SATURATED {
         1.0
     } else if x < -SATURATED {
@@ -323,6 +325,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     motion.slip_speeds(&mut out.slip_m_s);
     slides(&motion, drive, coulomb, &thresholds, &mut out);
     out.force_n[0] = force[0];
+    let mut loose = contact.slips_on.then(|| Loose::new(drive, slip_noise));
     for i in 1..n {
         let w = out.slip_m_s[i];
         let speed = w.abs();
@@ -330,6 +333,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         if load <= least_load {
             (held_m, held_branches_m) = (ways.block_m[i], ways.branches_m(i));
             out.sliding[i] = 1.0;
+            loose.iter_mut().for_each(|loose| loose.share = 0.0);
             continue;
         }
         let mut loaded = drive.factor.map_or(load, |factor| load * factor[i]);
@@ -359,14 +363,19 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             for b in 0..3 {
                 sticking += contact.branches[b].0 * (held_branches_m[b] + moved) * branch[b];
             }
-            // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
-            // Slower than what counts as slip it is friction at the slip's speed, its noise taken off.
-            let creep = (speed * speed - creep_noises[place].powi(2)).max(0.0).sqrt();
-            let limit = loaded * contact.curve.at(creep);
+            let (towards, coefficient) = if let Some(loose) = &mut loose {
+                (loose.towards(&motion, i, sticking), contact.curve.at(0.0))
+            } else {
+                // Slower than what counts as slip it is friction at the slip's speed, its noise taken off.
+                let creep = (speed * speed - creep_noises[place].powi(2)).max(0.0).sqrt();
+                let slow_m_s = 0.1 * thresholds[place];
+                (sigmoid((sticking.signum() * v / slow_m_s - 1.0) / WIDTH), contact.curve.at(creep))
+            };
+            let limit = loaded * coefficient;
             let over = (sticking.abs() - limit) / (LIMIT_WIDTH * limit);
             let mut breaks = 0.0;
             if over > -SATURATED {
-                let towards = sigmoid((sticking.signum() * v / (0.1 * thresholds[place]) - 1.0) / WIDTH);
+                // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
                 let beyond = if over > SATURATED {
                     sticking.abs() - limit
                 } else {
@@ -375,6 +384,11 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
                 breaks = sigmoid(over) * towards;
                 sticking -= sticking.signum() * beyond * towards;
             }
+            if let Some(loose) = &loose {
+                breaks += (1.0 - breaks) * loose.share;
+                let slipping = loaded * contact.curve.at(loose.slow_m_s);
+                sticking += breaks * (slipping.copysign(sticking) - sticking);
+            }
             let before = variance + added;
             let gain = before / (1.0 + before);
             let pulled = gain * drive.innovation_n(i, sticking) / k;
@@ -382,6 +396,9 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let stuck = if drive.at_end(i) { before } else { gain };
             let follows = slips + (1.0 - slips) * breaks;
             variance = follows * observed_variance + (1.0 - follows) * stuck;
+            if let Some(loose) = &mut loose {
+                (loose.share, out.sliding[i]) = (follows, follows);
+            }
             held_m = follows * ways.block_m[i] + (1.0 - follows) * (held_m + moved + pulled);
             let observed_m = ways.branches_m(i);
             for b in 0..3 {
@@ -392,18 +409,19 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
         } else {
             (held_m, held_branches_m) = (ways.block_m[i], ways.branches_m(i));
             variance = observed_variance;
+            loose.iter_mut().for_each(|loose| loose.share = 1.0);
             out.force_n[i] = sliding;
         }
         if let Some(ageing) = contact.ageing {
             let aged = ageing.renewed(age, speed, dt);
-            age = slips * aged + (1.0 - slips) * (age + dt);
+            age = out.sliding[i] * aged + (1.0 - out.sliding[i]) * (age + dt);
         }
     }
     out
 }
 
 /// The root and the block that it pulls.
-struct Motion<'m> {
+pub(super) struct Motion<'m> {
     root_m: &'m [f64],
     block_m: &'m [f64],
     /// Samples a second.
@@ -419,9 +437,16 @@ impl Motion<'_> {
 
     /// Speed of the root, even about a sample, m/s.
     #[inline]
-    fn root_m_s(&self, i: usize) -> f64 {
+    pub(super) fn root_m_s(&self, i: usize) -> f64 {
         let last = self.root_m.len() - 1;
         0.5 * self.rate * (self.way_m(i) + self.root_m[(i + 1).min(last)] - self.root_m[i.min(last - 1)])
+    }
+
+    /// Speeds of the root and of the block over this many samples about one, m/s.
+    pub(super) fn over(&self, i: usize, samples: usize) -> (f64, f64) {
+        let (from, to) = (i.saturating_sub(samples / 2), (i + samples / 2).min(self.root_m.len() - 1));
+        let rate = self.rate / (to - from) as f64;
+        (rate * (self.root_m[to] - self.root_m[from]), rate * (self.block_m[to] - self.block_m[from]))
     }
 
     /// Speed of the slip, even about each sample: means before and after it, or the law is late by half a step.
@@ -473,6 +498,7 @@ mod tests {
             damping_n_s_per_m,
             bristles_n_per_m: f64::INFINITY,
             bristles_alone: false,
+            slips_on: false,
             branches: [(0.0, 1.0); 3],
             viscous: (0.0, 0.0),
             ageing: None,

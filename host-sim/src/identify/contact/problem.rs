@@ -40,6 +40,10 @@ const WELL_KNOWN: f64 = 0.1;
 /// A step that gains less −ln posterior than this moves no value by more than a seventh of its deviation; so many at most.
 const SETTLED: f64 = 0.01;
 const MOST_SETTLING: usize = 20;
+/// Static friction is looked for within so many deviations of its prior, in steps of so much of its logarithm: breakaway moves
+/// by less than a sample over half of one.
+const STATIC_WITHIN: f64 = 2.5;
+const STATIC_STEP: f64 = 0.02;
 /// Slopes are good enough where a step gains more than this share of what they promised.
 pub const KEPT_PROMISE: f64 = 0.5;
 
@@ -50,6 +54,8 @@ pub enum Role {
     A0,
     /// Static minus Coulomb coefficient.
     A1,
+    /// Static coefficient, in place of A1.
+    Static,
     /// Stribeck speed.
     V0,
     /// Stribeck exponent.
@@ -98,6 +104,8 @@ pub struct Numbers {
     pub bristles_n_per_m: f64,
     /// Whether bristles that follow the root are all there is.
     pub bristles_alone: bool,
+    /// Whether what slips does so until the motion reverses or stops, however slow it is (brush with reset).
+    pub slips_on: bool,
     /// Lateness of the channel beyond the rig file's, ms.
     pub late_ms: f64,
     /// What the friction bridge shows where nothing pulls, N m.
@@ -138,11 +146,13 @@ impl Baseline {
     /// Numbers for fitted values.
     pub fn numbers(&self, p: &[f64]) -> Numbers {
         let mut numbers = self.numbers;
+        let mut most = None;
         for (at, base) in self.free.iter().enumerate() {
             let value = self.bounded(p, at);
             let slot = match base.role {
                 Role::A0 => &mut numbers.a0,
                 Role::A1 => &mut numbers.a1,
+                Role::Static => most.insert(0.0),
                 Role::V0 => &mut numbers.v0_m_s,
                 Role::Delta => &mut numbers.delta,
                 Role::A2 => &mut numbers.a2_s_per_m,
@@ -158,6 +168,10 @@ impl Baseline {
                 Role::NormalZero => &mut numbers.normal_zero_n,
             };
             *slot = if base.role.is_of_sensor() { value } else { value.exp() };
+        }
+        if let Some(most) = most {
+            // Less than Coulomb friction is nothing that a file may say, but a way back from there.
+            numbers.a1 = most - numbers.a0;
         }
         numbers
     }
@@ -275,6 +289,7 @@ impl<'a> Problem<'a> {
             damping_n_s_per_m: c,
             bristles_n_per_m: n.bristles_n_per_m,
             bristles_alone: has_no_block,
+            slips_on: n.slips_on,
             // They stand beside a block.
             branches: if has_no_block { [(0.0, 1.0); 3] } else { change.branches },
             viscous: (n.a2_s_per_m, change.film_n_s_per_m),
@@ -596,6 +611,21 @@ impl<'a> Problem<'a> {
             }
         }
         Fit { terms: terms.to_vec(), p, r, cost }
+    }
+
+    /// Values of a fit with better static friction, looked for within its prior: breaking loose moves in time with it, from sample
+    /// to sample, and slopes say little of that.
+    pub fn better_static(&self, fit: &Fit) -> Option<Vec<f64>> {
+        let at = self.baseline.free.iter().position(|base| base.role == Role::Static)?;
+        let prior = &self.baseline.free[at].parameter;
+        let steps = (STATIC_WITHIN * prior.sd / STATIC_STEP).ceil() as i32;
+        let tried = (-steps..=steps).into_par_iter().map(|step| {
+            let mut p = fit.p.clone();
+            p[at] = prior.mean + STATIC_STEP * f64::from(step);
+            (self.cost_at(&fit.terms, &p), p)
+        });
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.filter(|(cost, _)| *cost < fit.cost).map(|(_, p)| p)
     }
 
     /// A fit brought to its optimum: what is stated of it is less than what decides.

@@ -228,7 +228,7 @@ fn without(problem: &Problem<'_>, fit: &Fit, out: usize) -> Fit {
 pub fn baseline(problem: &Problem<'_>) -> Fit {
     let start: Vec<f64> = problem.baseline.free.iter().map(|b| b.parameter.mean).collect();
     let near = problem.fit(&[], start, 6, None);
-    problem.fit(&[], near.p, 6, None)
+    problem.fit(&[], problem.better_static(&near).unwrap_or(near.p), 6, None)
 }
 
 /// Of each set the fit that costs least, the least first.
