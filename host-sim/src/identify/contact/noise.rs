@@ -75,8 +75,8 @@ pub struct Noise {
     sources: Vec<[f64; SOURCES]>,
     /// The filter of what swings in each log with the present deviations, and the log's length.
     filters: Vec<(Option<Filter>, usize)>,
-    /// Variance of what is uncertain of the force itself, which strikes the sensor's mode: that of the named sources, since one
-    /// taken from residuals would grow with what nothing explains.
+    /// Variance of what is uncertain of the force itself, which strikes the sensor's mode: at most that of the named sources, since
+    /// one taken from residuals would grow with what nothing explains.
     pub(super) of_force: Vec<f64>,
     /// Share of the channel's own noise in each sample's variance.
     of_channel: Vec<f64>,
@@ -155,7 +155,6 @@ impl Noise {
                 );
             }
         }
-        let of_force = sources.iter().map(|n: &[f64; SOURCES]| n[OF_FORCE].iter().sum()).collect();
         let certainties = prediction.observed.iter().flat_map(|observed| &observed.certainty);
         let certainty: Vec<f64> = certainties.copied().collect();
         let times = logs
@@ -168,7 +167,6 @@ impl Noise {
             certainty.iter().zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
         let mut noise = Self {
             sources,
-            of_force,
             known,
             certainty,
             unresolved_s,
@@ -225,6 +223,8 @@ impl Noise {
     fn weigh(&mut self, logs: &[ContactLog], factors: &[f64; SOURCES]) {
         let sum = |n: &[f64; SOURCES]| n.iter().zip(factors).map(|(n, a)| n * a).sum::<f64>().max(1e-24);
         let mut variance: Vec<f64> = self.sources.iter().map(sum).collect();
+        let of_force = |n: &[f64; SOURCES]| OF_FORCE.map(|s| factors[s].min(1.0) * n[s]).sum();
+        self.of_force = self.sources.iter().map(of_force).collect();
         let mut from = 0;
         self.filters.clear();
         for log in logs {
@@ -497,5 +497,18 @@ mod tests {
         // None counts as more than one that does not swing.
         noise.set_repeated(1.0);
         assert_eq!(counts(&noise), [0.5, 0.5, 0.5, 0.5]);
+    }
+
+    /// A mode is struck by what is uncertain of the force: of no more than residuals leave room for, and of no more than is named.
+    #[test]
+    fn what_strikes_a_mode_is_no_more_than_is_named_or_left() {
+        let mut noise = Noise { sources: vec![[1.0; SOURCES]; 3], ..Noise::default() };
+        let struck = |noise: &mut Noise, of_force: f64| {
+            let mut factors = [1.0; SOURCES];
+            factors[OF_FORCE].fill(of_force);
+            noise.weigh(&[], &factors);
+            noise.of_force[1] / OF_FORCE.len() as f64
+        };
+        assert_eq!([0.1, 1.0, 5.0].map(|of_force| struck(&mut noise, of_force)), [0.1, 1.0, 1.0]);
     }
 }
