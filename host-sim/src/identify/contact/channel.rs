@@ -11,7 +11,7 @@ use super::change::Change;
 use super::log::ContactLog;
 use super::problem::Numbers;
 use super::smoothing::OBSERVED_OVER;
-use crate::identify::filters::{before_mode, shifted, smoothed_flat};
+use crate::identify::filters::{adaptively_smoothed, before_mode, shifted, smoothed_flat};
 use crate::identify::grid::STEP_S;
 
 /// A mode slower than this many times the sampling rate is simulated; a faster one is its delay.
@@ -102,8 +102,10 @@ impl<'a> Channel<'a> {
     /// What its amplifier and its lateness add to the torque that it shows, N m, taken ahead by the rig file's delay.
     pub(super) fn error_nm(&mut self) -> Vec<f64> {
         let log = self.log;
-        let mut shown_nm = shifted(&log.friction_nm, log.friction_late);
-        let delayed = self.before_delay(Cow::Borrowed(&log.friction_nm));
+        // The noise of a channel is no error of its lateness: it would be there twice, now and when it was late.
+        let smooth_nm = adaptively_smoothed(&log.friction_nm, log.friction_noise_nm);
+        let mut shown_nm = shifted(&smooth_nm, log.friction_late);
+        let delayed = self.before_delay(Cow::Owned(smooth_nm));
         let torque_nm = self.before_amplifier(delayed);
         shown_nm.iter_mut().zip(torque_nm.iter()).for_each(|(shown, torque)| *shown -= torque);
         shown_nm
@@ -216,6 +218,8 @@ mod tests {
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
     use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
+    use crate::identify::filters::rms;
+    use crate::identify::noise::tests::white;
 
     const COUNT: usize = 2000;
     /// Samples.
@@ -270,7 +274,7 @@ mod tests {
     /// A gain that changes nothing has the channel undone step by step.
     #[test]
     fn every_hypothesis_sees_the_same_filter() {
-        let noise = crate::identify::noise::tests::white(COUNT, 5);
+        let noise = white(COUNT, 5);
         let step = |i: f64| if i < 1000.0 { 1.0 } else { 4.0 };
         // 0.3 N m over a damping of 160 N s/m are 0.04 m/s, and the root moves at 0.3 m/s.
         let late = |log: ContactLog| ContactLog { friction_late: 3.0, ..log };
@@ -306,6 +310,21 @@ mod tests {
             error_nm(&[log(series(torque))], &Change { mode: Some((80.0, 0.1)), ..Change::default() })
                 .is_none()
         );
+    }
+
+    #[test]
+    fn noise_is_no_error_of_a_late_channel() {
+        const NOISE_NM: f64 = 0.1;
+        let torque = |i: f64| 3.0 * (0.01 * i).sin();
+        let noise = white(COUNT, 5);
+        let log = log(series(|i| torque(i - LATE) + NOISE_NM * noise[i as usize]));
+        let change = Change { late_s: 1e-3 * LATE, ..Change::default() };
+        let [error] = error_nm(&[log], &change).unwrap().try_into().unwrap();
+        let expected = series(|i| torque(i - LATE) - torque(i));
+        let left: Vec<f64> =
+            error.iter().zip(&expected).map(|(a, b)| a - b).skip(50).take(COUNT - 100).collect();
+        // Its noise from two times would be 1.4 times that of one.
+        assert!(rms(&left) < 0.7 * NOISE_NM, "{}", rms(&left));
     }
 
     #[test]
