@@ -192,7 +192,7 @@ fn with_numbers(
     let damping = if has_block(model) { "c_u_n_s_per_m" } else { "sigma1_n_s_per_m" };
     let mut fitted = vec![
         ("a0", n.a0 / theta),
-        ("a1", n.a1 / theta),
+        ("a1", n.static_drop() / theta),
         ("v0_m_s", n.v0_m_s),
         ("delta", n.delta.clamp(0.1, 4.0)),
         ("theta", theta),
@@ -200,7 +200,7 @@ fn with_numbers(
         (stiffness, n.stiffness_n_per_m),
         (damping, n.damping_n_s_per_m),
         ("mu_c", n.a0),
-        ("mu_s", n.a0 + n.a1.max(0.0)),
+        ("mu_s", n.a0 + n.static_drop()),
         ("c_n_per_m", n.stiffness_n_per_m),
     ];
     fitted.extend(block.into_iter().flat_map(|(k, c)| [("k_u_n_per_m", k), ("c_u_n_s_per_m", c)]));
@@ -305,5 +305,15 @@ mod tests {
         });
         assert_eq!((brush.kind, brush.get("k_u_n_per_m")), (ModelKind::Series, Some(2e4)));
         assert_eq!(brush.to_toml(), lugre.to_toml());
+    }
+
+    #[test]
+    fn a_brush_that_was_fitted_without_a_fall_is_a_file_that_can_be_read() {
+        let brush = "kind = \"brush\"\n[parameters]\nc_n_per_m = 3e4\nmu_s = 0.5\nmu_c = 0.5\n";
+        let model = ModelFile::parse("model.toml", brush).unwrap();
+        let numbers = Numbers { a1: -0.02, ..baseline(&model, KNOWN_WITHIN).numbers };
+        let [alone, in_series] =
+            [None, Some((2e4, 50.0))].map(|block| with_numbers(&model, &numbers, block).unwrap());
+        assert_eq!((alone.get("mu_s"), in_series.get("a1")), (Some(0.5), Some(0.0)));
     }
 }

@@ -121,7 +121,7 @@ fn value(model: &ModelFile, baseline: &Baseline, p: &[f64], name: &str) -> f64 {
         "a1" => numbers.a1 / theta,
         "theta" => theta,
         "mu_c" => numbers.a0,
-        "mu_s" => numbers.a0 + numbers.a1.max(0.0),
+        "mu_s" => numbers.a0 + numbers.static_drop(),
         "v0_m_s" => numbers.v0_m_s,
         "delta" => numbers.delta,
         "a2_s_per_m" => numbers.a2_s_per_m,

@@ -10,7 +10,7 @@
 //! | form of the model | 0.4 % of the force |
 //! | noise of the slip speed | through g′, where the tip slips |
 //! | noise of the root's motion | through the stiffness, where it sticks; of bristles without a block [`certainty`](super::observer::Observed::certainty) has it, and this only what is named |
-//! | transitions | 3 % of the load near a change between slip and stick; 0.3 of the whole fall from static to sliding friction where nothing slows it (brush) |
+//! | transitions | 3 % of the load near a change between slip and stick; of a brush 0.3 of the fall, and what that rings with |
 //!
 //! What swings faster than a model follows is not independent from sample to sample: residuals go through a filter that tells
 //! it from its last samples (`ringing.rs`), and σ² has what the filter does not know of it besides. Nor is the channel's 1/f

@@ -40,8 +40,8 @@ const WELL_KNOWN: f64 = 0.1;
 /// A step that gains less −ln posterior than this moves no value by more than a seventh of its deviation; so many at most.
 const SETTLED: f64 = 0.01;
 const MOST_SETTLING: usize = 20;
-/// Static friction is looked for within so many deviations of its prior, in steps of so much of its logarithm: breakaway moves
-/// by less than a sample over half of one.
+/// Static friction is looked for within so many deviations of its prior, a little less than its bound, in steps of so much of its
+/// logarithm: over half of one breakaway moves by less than a sample of a millisecond, but for the slowest motion.
 const STATIC_WITHIN: f64 = 2.5;
 const STATIC_STEP: f64 = 0.02;
 /// Slopes are good enough where a step gains more than this share of what they promised.
@@ -115,6 +115,11 @@ pub struct Numbers {
 }
 
 impl Numbers {
+    /// Static minus Coulomb coefficient as a file may have it: a search may be below nothing for a while.
+    pub fn static_drop(&self) -> f64 {
+        self.a1.max(0.0)
+    }
+
     /// Stiffness and damping in series for those of another element, where there is one.
     pub fn exchange(&mut self, other: &mut Option<(f64, f64)>) {
         if let Some((stiffness_n_per_m, damping_n_s_per_m)) = other {

@@ -16,8 +16,8 @@ const BENDS: [f64; 3] = [0.1, 0.3, 10.0];
 /// Half periods in the longest log up to which a drift's wandering is told: what changes faster is none.
 const WANDERING: usize = 4;
 
-/// Share of all of it by which a gain drifts, deviation of the prior, where a zero may drift by all: a foil's factor by a percent in 100 K, an amplifier's by
-/// less; a tenth is a bridge that is coming loose.
+/// Share of all of it by which a gain drifts, deviation of the prior, where a zero may drift by all: a foil's factor by a percent in
+/// 100 K, an amplifier's by less; a tenth is a bridge that is coming loose.
 const GAIN: f64 = 0.1;
 
 /// What a drift does over time, given as a share of the longest log, and from nothing where a log begins.
