@@ -1,7 +1,8 @@
 //! From clean samples to what a log holds: noise, converters, encoder counts.
 //!
 //! Noise is normal, per sample, with a size drawn per case around that of good bridges and drives; the bridges' has a
-//! part that falls with frequency (a strain gauge's amplifier flickers), and they show a little where nothing pulls.
+//! part that falls with frequency (a strain gauge's amplifier flickers), and they show a little where nothing pulls. Behind a
+//! converter that averages, which each of them has in a third of the cases, a sample keeps some of the noise of the one before.
 //! Converters have 16 bits, encoders 480 000 counts a turn. Order: amplifier (it may clip), noise, converter (so may
 //! it). A drive reports its speed as it turns, or as the way of the counts over the last samples, half of them late.
 
@@ -20,6 +21,8 @@ const COUNTS_PER_RAD: f64 = 480_000.0 / std::f64::consts::TAU;
 
 /// Time constants of what flickers, s: parts of equal size a decade apart have a power that falls with frequency.
 const FLICKER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
+/// What of a sample's noise stays in the next one behind a converter that averages.
+const MOST_KEPT: [f64; 2] = [0.5, 0.9];
 /// Most samples over which a drive takes its speed.
 const MOST_SAMPLES: usize = 4;
 
@@ -48,6 +51,8 @@ pub struct Noise {
     pub normal_zero_n: f64,
     /// Samples over which the drive takes its speed from its counts; 0 where it knows it.
     pub speed_samples: usize,
+    /// What of a sample's noise stays in the next one, by bridge (friction, normal): a converter that averages.
+    pub kept: [f64; 2],
 }
 
 impl Noise {
@@ -59,6 +64,13 @@ impl Noise {
         let flicker_share = sensors.uniform(0.2, 0.7);
         let reports = sensors.chance(0.5) && factor > 0.0;
         let speed_samples = if reports { 1 + sensors.below(MOST_SAMPLES) } else { 0 };
+        // Each of the bridges in a third of the cases.
+        let mut converters = Stream::new(seed, "converters");
+        let kept = [(); 2].map(|()| {
+            let (averages, kept) =
+                (converters.chance(1.0 / 3.0), converters.uniform(MOST_KEPT[0], MOST_KEPT[1]));
+            if averages { kept } else { 0.0 }
+        });
         let mut s = Stream::new(seed, "noise");
         let mut about = |value: f64| factor * s.about(value, 0.3);
         Self {
@@ -73,6 +85,7 @@ impl Noise {
             friction_zero_nm: factor * friction_zero,
             normal_zero_n: factor * normal_zero,
             speed_samples,
+            kept,
         }
     }
 }
@@ -217,6 +230,7 @@ pub fn contact_csv(
     );
     text.push_str(if temperature { ",surface_temperature_c\n" } else { "\n" });
     let mut flicker = [Flicker::new(s), Flicker::new(s)];
+    let mut new = [s.normal(), s.normal()];
     // The first sample's counts, as long as there are none before.
     let mut counts = std::collections::VecDeque::new();
     for sample in samples {
@@ -226,8 +240,11 @@ pub fn contact_csv(
         if let Some(clip) = &mut clip {
             (friction, normal) = clip.amplifier(sample);
         }
-        friction += noise.friction_zero_nm + noise.friction_nm * (s.normal() + in_friction);
-        normal += noise.normal_zero_n + noise.normal_n * (s.normal() + in_normal);
+        for (new, kept) in new.iter_mut().zip(noise.kept) {
+            *new = kept * *new + (1.0 - kept * kept).sqrt() * s.normal();
+        }
+        friction += noise.friction_zero_nm + noise.friction_nm * (new[0] + in_friction);
+        normal += noise.normal_zero_n + noise.normal_n * (new[1] + in_normal);
         if let Some(clip) = &clip {
             (friction, normal) = clip.converter(friction, normal);
         }

@@ -193,6 +193,35 @@ fn there_are_27_names_and_each_is_found_by_its_id() {
     }
 }
 
+/// What a sample shares with the next one of the noise of both bridges.
+#[test]
+fn some_converters_average_their_noise() {
+    let mut averaging = 0;
+    for seed in 0..8 {
+        let of = |noise_factor| {
+            let scenario = Scenario { duration_s: 6.0, noise_factor, ..Scenario::new(&[], seed) };
+            generate(&Scenario { imperfection: Imperfection::None, ..scenario }).unwrap()
+        };
+        let (with, without) = (of(1.0), of(0.0));
+        let noise = with.truth.noise;
+        for (column, kept) in ["friction_torque_nm", "normal_force_n"].iter().zip(noise.kept) {
+            let [with, without] = [&with, &without].map(|case| logs(case)[0].column(column).to_vec());
+            let error: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
+            let zero = error.iter().sum::<f64>() / error.len() as f64;
+            let product = |lag: usize| -> f64 {
+                error.iter().zip(&error[lag..]).map(|(a, b)| (a - zero) * (b - zero)).sum()
+            };
+            // What flickers changes little from one millisecond to the next, and is in part no more than the zero of a short log.
+            let flicker = noise.flicker_share.powi(2);
+            let expected = kept - 0.05..(kept + flicker) / (1.0 + flicker) + 0.05;
+            let found = product(1) / product(0);
+            assert!(expected.contains(&found), "{seed} {column}: {found}, not in {expected:?}");
+            averaging += usize::from(kept > 0.0);
+        }
+    }
+    assert!((2..14).contains(&averaging), "{averaging} of 16");
+}
+
 #[test]
 fn strong_imperfections_leave_out_rows_and_shift_instants_and_mild_ones_are_below_the_noise() {
     let of = |imperfection| {
