@@ -14,7 +14,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 pub use self::search::{Company, Propose, search};
-use super::contact::noise::slow_share;
+use super::contact::noise::share_below;
 use super::contact::problem::FREEDOM;
 use super::filters::{self, deviation_by_median, local_maximum};
 use super::rest;
@@ -168,6 +168,9 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
+/// Frequencies below which causes live, Hz: those of fast orders, and those of most. Noise that a converter has averaged is denser the slower it
+/// is, and what counts is its density where a cause is.
+const TEMPERED_HZ: [f64; 2] = [30.0, 7.5];
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 
@@ -411,7 +414,8 @@ impl Balance {
         self.whiten(of_each);
         let new = self.whitening.of(&solved.residual);
         let pull: Vec<f64> = new.iter().map(|r| r * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
-        self.temper = slow_share(&pull, self.row_step_s).max(1.0);
+        self.temper =
+            TEMPERED_HZ.iter().map(|hz| share_below(*hz, &pull, self.row_step_s)).fold(1.0, f64::max);
     }
 
     /// Takes back what [`Self::refit_noise`] has done.
@@ -453,6 +457,26 @@ pub(super) mod tests {
         let column = (0..ROWS).map(|i| (0.01 * i as f64).sin()).collect();
         let base = [vec![(Parameter::amplitude("swing", 10.0), column)], more].concat();
         Balance::new(response, base, &[white_log(ROWS, 1.0)], 1.0)
+    }
+
+    /// A mean over long blocks of noise of which a sample keeps nine tenths has 19 times the variance of one of white noise.
+    #[test]
+    fn noise_that_a_converter_averages_counts_as_often_as_it_repeats_itself() {
+        let temper = |kept: f64| {
+            let of_seed = |seed: u64| {
+                let keep = |state: &mut f64, new: f64| {
+                    *state = kept * *state + new;
+                    Some(*state)
+                };
+                let mut balance = balance(white(ROWS, seed).into_iter().scan(0.0, keep).collect());
+                let solved = balance.solve(&[], &[]);
+                balance.refit_level(&solved, 0.0);
+                balance.temper
+            };
+            (1..=8).map(of_seed).sum::<f64>() / 8.0
+        };
+        let [white, averaged] = [0.0, 0.9].map(temper);
+        assert!((1.0..1.2).contains(&white) && (14.0..22.0).contains(&averaged), "{white} {averaged}");
     }
 
     #[test]

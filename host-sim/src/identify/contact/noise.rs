@@ -403,15 +403,14 @@ fn cycles_resolved(slides: &[bool]) -> Vec<bool> {
     local_maximum(&fast, reach).into_iter().map(|fast| fast == 0.0).collect()
 }
 
-/// Mean spectral density below [`SLOW_HZ`] or a quarter of it, where it is larger, over that of all frequencies: noise that a
-/// converter has averaged is denser the slower it is.
+/// Mean spectral density below [`SLOW_HZ`] over that of all.
 pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
-    share_below(SLOW_HZ, values, step_s).max(share_below(SLOW_HZ / 4.0, values, step_s))
+    share_below(SLOW_HZ, values, step_s)
 }
 
 /// Mean spectral density below a frequency over that of all: from the variance of means over blocks of half a period of it,
 /// which is its spectral window.
-fn share_below(hz: f64, values: &[f64], step_s: f64) -> f64 {
+pub(crate) fn share_below(hz: f64, values: &[f64], step_s: f64) -> f64 {
     let block = (0.5 / (hz * step_s)).round().max(1.0) as usize;
     let all = values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
     let (mut sum, mut count) = (0.0, 0);
@@ -429,24 +428,6 @@ mod tests {
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
     use crate::identify::noise::tests::white;
-
-    /// A mean over long blocks of noise of which a sample keeps so much has (1 + kept)/(1 − kept) times the variance of one of
-    /// white noise.
-    #[test]
-    fn noise_that_a_converter_averages_counts_as_often_as_it_repeats_itself() {
-        for kept in [0.0, 0.6, 0.9] {
-            let new = white(40_000, 11);
-            let keep = |state: &mut f64, e: &f64| {
-                *state = kept * *state + e;
-                Some(*state)
-            };
-            let noise: Vec<f64> = new.iter().scan(0.0, keep).collect();
-            let all_of_it = (1.0 + kept) / (1.0 - kept);
-            let share = slow_share(&noise, 1e-3);
-            // 600 blocks know a variance within 6 %.
-            assert!((share / all_of_it - 1.0).abs() < 0.15, "{kept}: {share} for {all_of_it}");
-        }
-    }
 
     #[test]
     fn rest_says_nothing_of_how_noisy_the_sensor_is() {
