@@ -44,6 +44,8 @@ const OF_FORCE: std::ops::Range<usize> = 3..7;
 /// Samples of a cycle of slip and stick below which its jumps run into each other: each is uncertain over the smoothing's width
 /// and the two samples beside it, and there are two in a cycle.
 const SAMPLES_PER_CYCLE: usize = 10;
+/// What swings by more than so many deviations of the sensor's noise from one sample to the next does not do so by that noise.
+const SWING_NOISES: f64 = 6.0;
 /// The sensor's noise is known from the channel itself: its variance is at least this share of it.
 const LEAST_SENSOR: f64 = 0.2;
 /// Sources that are errors of the channel, from which the slip is observed too: the sensor's, motion between samples.
@@ -117,7 +119,7 @@ impl Noise {
                 predicted.iter().zip(&wide_change).map(|(p, m)| p.min(3.0 * m + floor)).collect();
             let wide_predicted = local_maximum(&predicted, 6);
             let slides: Vec<bool> = observed.sliding.iter().map(|s| *s > 0.5).collect();
-            resolved.extend(cycles_resolved(&slides));
+            resolved.extend(cycles_resolved(&slides, &swings(log, contact)));
             let transition = local_maximum(
                 &magnitude(gradient(&slides.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<f64>>())),
                 4,
@@ -385,21 +387,39 @@ impl Noise {
     }
 }
 
+/// Where the channel swings from sample to sample and slip is unstable: friction falls with speed by more than the block damps
+/// (c_u < F_N |g′|), so that what looks like a slide is a cycle of slip and stick, and the slip that is seen is none that was.
+fn swings(log: &ContactLog, contact: &Contact) -> Vec<bool> {
+    let unstable = |i: usize| {
+        let fall = contact.curve.slope(log.root_speed_m_s[i].abs().max(log.speed_noise_m_s));
+        let (per_load, film) = contact.viscous;
+        let damps = contact.damping_n_s_per_m + per_load * log.load_n[i] + film;
+        !contact.bristles_alone && log.load_n[i] * fall > damps
+    };
+    let swing = SWING_NOISES * log.friction_noise_nm;
+    let steps = |i: usize| (log.friction_nm[i] - log.friction_nm[i.saturating_sub(1)]).abs() > swing;
+    (0..log.len()).map(|i| steps(i) && unstable(i)).collect()
+}
+
 /// Where cycles of slip and stick are long enough to be told from samples. Faster ones are seen through what smooths the channel,
 /// and friction at a slip that is smoothed is wrong by the same in each of them.
-fn cycles_resolved(slides: &[bool]) -> Vec<bool> {
+fn cycles_resolved(slides: &[bool], swings: &[bool]) -> Vec<bool> {
     // Over two such cycles, or a single breakaway that hesitates would count.
     let reach = SAMPLES_PER_CYCLE;
-    let mut changes = vec![0usize];
-    changes.extend(slides.windows(2).scan(0, |sum, pair| {
-        *sum += usize::from(pair[0] != pair[1]);
-        Some(*sum)
-    }));
     let last = slides.len().saturating_sub(1);
-    let fast: Vec<f64> = (0..slides.len())
-        .map(|i| changes[(i + reach).min(last)] - changes[i.saturating_sub(reach)])
-        .map(|near| f64::from(u8::from(near > 4)))
-        .collect();
+    let so_far = |counts: &dyn Fn(usize) -> bool| -> Vec<usize> {
+        let sum = |sum: &mut usize, i: usize| {
+            *sum += usize::from(counts(i));
+            Some(*sum)
+        };
+        (0..=last).scan(0, sum).collect()
+    };
+    let [changes, swings] =
+        [so_far(&|i| i > 0 && slides[i] != slides[i - 1]), so_far(&|i| swings.get(i) == Some(&true))];
+    let near = |sums: &[usize], i: usize| sums[(i + reach).min(last)] - sums[i.saturating_sub(reach)];
+    // A cycle that is resolved swings in few of its samples.
+    let fast = |i: usize| near(&changes, i) > 4 || near(&swings, i) > reach;
+    let fast: Vec<f64> = (0..slides.len()).map(|i| f64::from(u8::from(fast(i)))).collect();
     local_maximum(&fast, reach).into_iter().map(|fast| fast == 0.0).collect()
 }
 
@@ -423,6 +443,7 @@ pub(crate) fn share_below(hz: f64, values: &[f64], step_s: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::law::Curve;
     use super::*;
     use crate::files::log::Log;
     use crate::files::rig_file::RigFile;
@@ -485,10 +506,45 @@ mod tests {
             _ => i % 30 < 10,
         };
         let slides: Vec<bool> = (0..1200).map(slides).collect();
-        let resolved = cycles_resolved(&slides);
+        let resolved = cycles_resolved(&slides, &[false; 1200]);
         assert!(resolved[..170].iter().all(|resolved| *resolved));
         assert!(resolved[200..600].iter().all(|resolved| !resolved));
         assert!(resolved[640..].iter().all(|resolved| *resolved));
+    }
+
+    /// A slide that friction's fall makes unstable, and whose torque swings in every sample, is none.
+    #[test]
+    fn a_torque_that_swings_from_sample_to_sample_is_no_slide_where_sliding_is_unstable() {
+        const COUNT: usize = 1200;
+        // 40 % at each sample of the middle; noise elsewhere.
+        let swing = |i: usize| if (400..800).contains(&i) { [1.0, 0.2, -1.2][i % 3] } else { 0.0 };
+        let shown = white(COUNT, 5).iter().enumerate().map(|(i, e)| 2.0 + swing(i) + 0.01 * e).collect();
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..COUNT).map(|i| 1e-3 * i as f64).collect());
+        log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
+        log.set_signal(Signal::NormalForce, vec![50.0; COUNT]);
+        log.set_signal(Signal::FrictionTorque, shown);
+        let log = ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap();
+        let resolved = |damping_n_s_per_m: f64| {
+            let contact = Contact {
+                curve: Curve::new(|w| 0.4 + 0.3 * (-w / 0.3).exp()),
+                damping_n_s_per_m,
+                stiffness_n_per_m: 1e4,
+                bristles_n_per_m: f64::INFINITY,
+                bristles_alone: false,
+                slips_on: false,
+                branches: [(0.0, 1.0); 3],
+                viscous: (0.0, 0.0),
+                ageing: None,
+            };
+            cycles_resolved(&[true; COUNT], &swings(&log, &contact))
+        };
+        // 50 N times 1 s/m times e^(−speed/0.3).
+        let slope = 50.0 * (-log.root_speed_m_s[COUNT / 2] / 0.3).exp();
+        assert!(resolved(2.0 * slope).iter().all(|resolved| *resolved));
+        let unstable = resolved(0.5 * slope);
+        assert!(unstable[402..798].iter().all(|resolved| !resolved));
+        assert!(unstable[..375].iter().chain(&unstable[825..]).all(|resolved| *resolved));
     }
 
     #[test]
