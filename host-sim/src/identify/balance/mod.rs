@@ -168,8 +168,8 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
-/// Frequencies below which causes live, Hz: those of fast orders, and those of most. Noise that a converter has averaged is denser the slower it
-/// is, and what counts is its density where a cause is.
+/// Frequencies below which causes live, Hz: those of fast orders, and those of most. A bridge's noise that a converter has averaged is
+/// denser the slower it is, and what counts is its density where a cause is.
 const TEMPERED_HZ: [f64; 2] = [30.0, 7.5];
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
@@ -414,8 +414,9 @@ impl Balance {
         self.whiten(of_each);
         let new = self.whitening.of(&solved.residual);
         let pull: Vec<f64> = new.iter().map(|r| r * (FREEDOM + 1.0) / (FREEDOM + r * r)).collect();
-        self.temper =
-            TEMPERED_HZ.iter().map(|hz| share_below(*hz, &pull, self.row_step_s)).fold(1.0, f64::max);
+        // A drive alone has no bridge, and what it leaves slowly is the form of its friction.
+        let bands = if self.rests { &TEMPERED_HZ[..] } else { &TEMPERED_HZ[..1] };
+        self.temper = bands.iter().map(|hz| share_below(*hz, &pull, self.row_step_s)).fold(1.0, f64::max);
     }
 
     /// Takes back what [`Self::refit_noise`] has done.
