@@ -44,7 +44,8 @@ const OF_FORCE: std::ops::Range<usize> = 3..7;
 /// Samples of a cycle of slip and stick below which its jumps run into each other: each is uncertain over the smoothing's width
 /// and the two samples beside it, and there are two in a cycle.
 const SAMPLES_PER_CYCLE: usize = 10;
-/// What swings by more than so many deviations of the sensor's noise from one sample to the next does not do so by that noise.
+/// What swings by more than so many deviations of the sensor's noise from one sample to the next, four of such a difference, does not
+/// do so by that noise.
 const SWING_NOISES: f64 = 6.0;
 /// The sensor's noise is known from the channel itself: its variance is at least this share of it.
 const LEAST_SENSOR: f64 = 0.2;
@@ -388,13 +389,13 @@ impl Noise {
 }
 
 /// Where the channel swings from sample to sample and slip is unstable: friction falls with speed by more than the block damps
-/// (c_u < F_N |g′|), so that what looks like a slide is a cycle of slip and stick, and the slip that is seen is none that was.
+/// (c_u < −F_N g′), so that what looks like a slide is a cycle of slip and stick, and the slip that is seen is none that was.
 fn swings(log: &ContactLog, contact: &Contact) -> Vec<bool> {
     let unstable = |i: usize| {
-        let fall = contact.curve.slope(log.root_speed_m_s[i].abs().max(log.speed_noise_m_s));
+        let (_, rise) = contact.curve.at_with_derivative(log.root_speed_m_s[i].abs());
         let (per_load, film) = contact.viscous;
         let damps = contact.damping_n_s_per_m + per_load * log.load_n[i] + film;
-        !contact.bristles_alone && log.load_n[i] * fall > damps
+        !contact.bristles_alone && -log.load_n[i] * rise > damps
     };
     let swing = SWING_NOISES * log.friction_noise_nm;
     let steps = |i: usize| (log.friction_nm[i] - log.friction_nm[i.saturating_sub(1)]).abs() > swing;
@@ -444,6 +445,7 @@ pub(crate) fn share_below(hz: f64, values: &[f64], step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::law::Curve;
+    use super::super::observer::tests::block;
     use super::*;
     use crate::files::log::Log;
     use crate::files::rig_file::RigFile;
@@ -525,24 +527,16 @@ mod tests {
         log.set_signal(Signal::NormalForce, vec![50.0; COUNT]);
         log.set_signal(Signal::FrictionTorque, shown);
         let log = ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap();
-        let resolved = |damping_n_s_per_m: f64| {
-            let contact = Contact {
-                curve: Curve::new(|w| 0.4 + 0.3 * (-w / 0.3).exp()),
-                damping_n_s_per_m,
-                stiffness_n_per_m: 1e4,
-                bristles_n_per_m: f64::INFINITY,
-                bristles_alone: false,
-                slips_on: false,
-                branches: [(0.0, 1.0); 3],
-                viscous: (0.0, 0.0),
-                ageing: None,
-            };
+        let resolved = |damping_n_s_per_m: f64, change: f64| {
+            let contact = block(1e4, damping_n_s_per_m, Curve::new(|w| 0.4 + change * (-w / 0.3).exp()));
             cycles_resolved(&[true; COUNT], &swings(&log, &contact))
         };
         // 50 N times 1 s/m times e^(−speed/0.3).
         let slope = 50.0 * (-log.root_speed_m_s[COUNT / 2] / 0.3).exp();
-        assert!(resolved(2.0 * slope).iter().all(|resolved| *resolved));
-        let unstable = resolved(0.5 * slope);
+        assert!(resolved(2.0 * slope, 0.3).iter().all(|resolved| *resolved));
+        // Nor is a slide unstable where friction rises with speed.
+        assert!(resolved(0.5 * slope, -0.3).iter().all(|resolved| *resolved));
+        let unstable = resolved(0.5 * slope, 0.3);
         assert!(unstable[402..798].iter().all(|resolved| !resolved));
         assert!(unstable[..375].iter().chain(&unstable[825..]).all(|resolved| *resolved));
     }

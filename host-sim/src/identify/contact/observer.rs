@@ -486,12 +486,17 @@ fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, thresholds: &[f6
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::identify::contact::law::Curve;
     use crate::identify::noise::White;
 
-    fn block(stiffness_n_per_m: f64, damping_n_s_per_m: f64, curve: Curve) -> Contact {
+    /// A block that slips as a whole.
+    pub(in crate::identify::contact) fn block(
+        stiffness_n_per_m: f64,
+        damping_n_s_per_m: f64,
+        curve: Curve,
+    ) -> Contact {
         Contact {
             curve,
             stiffness_n_per_m,
