@@ -21,8 +21,8 @@ const COUNTS_PER_RAD: f64 = 480_000.0 / std::f64::consts::TAU;
 
 /// Time constants of what flickers, s: parts of equal size a decade apart have a power that falls with frequency.
 const FLICKER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
-/// What of a sample's noise stays in the next one behind a converter that averages.
-const MOST_KEPT: [f64; 2] = [0.5, 0.9];
+/// Range of what of a sample's noise stays in the next one, behind a converter that averages.
+const KEPT: [f64; 2] = [0.5, 0.9];
 /// Most samples over which a drive takes its speed.
 const MOST_SAMPLES: usize = 4;
 
@@ -67,8 +67,7 @@ impl Noise {
         // Each of the bridges in a third of the cases.
         let mut converters = Stream::new(seed, "converters");
         let kept = [(); 2].map(|()| {
-            let (averages, kept) =
-                (converters.chance(1.0 / 3.0), converters.uniform(MOST_KEPT[0], MOST_KEPT[1]));
+            let (averages, kept) = (converters.chance(1.0 / 3.0), converters.uniform(KEPT[0], KEPT[1]));
             if averages { kept } else { 0.0 }
         });
         let mut s = Stream::new(seed, "noise");

@@ -132,6 +132,7 @@ pub(super) fn repeated(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::spectrum::{SLOW_HZ, share_below};
 
     fn noise(count: usize, mut seed: u64) -> Vec<f64> {
         let mut uniform = || {
@@ -162,7 +163,7 @@ mod tests {
         // The form of the swing is wrong by as much as the noise, over a half of the log one way and the other way after it.
         let wrong: Vec<f64> =
             (0..n).map(|i| white[i] + if i < n / 2 { swing[i] } else { -swing[i] }).collect();
-        let slow = super::super::contact::noise::slow_share(&wrong, 1e-3);
+        let slow = share_below(SLOW_HZ, &wrong, 1e-3);
         let counts = of(&wrong);
         assert!(slow < 2.0 && counts > 20.0, "{slow} {counts}");
     }

@@ -14,6 +14,8 @@ const SHORTEST: usize = 64;
 const BESIDE: usize = 4;
 /// Places over which the level around a peak is taken.
 const AROUND: usize = 32;
+/// Frequency below which causes live, Hz; above it residuals only tell how white they are.
+pub const SLOW_HZ: f64 = 30.0;
 
 /// Power spectral density at even frequencies from 0 to half the sampling rate.
 pub struct Spectrum {
@@ -87,6 +89,19 @@ impl Spectrum {
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found.into_iter().take(most).map(|(_, at)| at as f64 * self.step).collect()
     }
+}
+
+/// Mean spectral density below a frequency over that of all: from the variance of means over blocks of half a period of it,
+/// which is its spectral window.
+pub fn share_below(hz: f64, values: &[f64], step_s: f64) -> f64 {
+    let block = (0.5 / (hz * step_s)).round().max(1.0) as usize;
+    let all = values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
+    let (mut sum, mut count) = (0.0, 0);
+    for chunk in values.chunks_exact(block) {
+        sum += chunk.iter().sum::<f64>().powi(2) / block as f64;
+        count += 1;
+    }
+    if all > 0.0 && count > 0 { sum / f64::from(count) / all } else { 1.0 }
 }
 
 #[cfg(test)]

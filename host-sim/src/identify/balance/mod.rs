@@ -14,11 +14,11 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 pub use self::search::{Company, Propose, search};
-use super::contact::noise::share_below;
 use super::contact::problem::FREEDOM;
 use super::filters::{self, deviation_by_median, local_maximum};
 use super::rest;
 use super::slow_noise;
+use super::spectrum::{SLOW_HZ, share_below};
 use super::term::Parameter;
 use super::variance_components::{self, Sample};
 use super::whitening::{LogPoints, SLOW, Whitening};
@@ -170,7 +170,7 @@ const ROWS_PER_WIDTH: f64 = 0.5;
 const CLEAR_WIDTHS: f64 = 2.0;
 /// Frequencies below which causes live, Hz: those of fast orders, and those of most. A bridge's noise that a converter has averaged is
 /// denser the slower it is, and what counts is its density where a cause is.
-const TEMPERED_HZ: [f64; 2] = [30.0, 7.5];
+const TEMPERED_HZ: [f64; 2] = [SLOW_HZ, 0.25 * SLOW_HZ];
 /// Rows that count as one before the residuals tell it: neighbours share most of their filter.
 const FIRST_TEMPER: f64 = 3.0;
 

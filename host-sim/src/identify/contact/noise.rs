@@ -24,6 +24,7 @@ use super::problem::{FREEDOM, Prediction};
 use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
 use crate::identify::slow_noise::Errors;
+use crate::identify::spectrum::{SLOW_HZ, share_below};
 use crate::identify::variance_components::{self, Sample};
 use crate::identify::whitening::{LogPoints, SLOW, Whitening};
 
@@ -56,8 +57,6 @@ const LEAST_CERTAINTY: f64 = 0.5;
 /// Least certainty of a sample that tells how large the sources are: the way's noise is a tenth of the variance, and however wrong
 /// it is (an encoder at rest shows none of its counts) no more of the sensor's.
 const SURE: f64 = 0.95;
-/// Frequency below which effects live, Hz; above it residuals only tell how white they are.
-const SLOW_HZ: f64 = 30.0;
 
 /// The noise model.
 #[derive(Debug, Clone, Default)]
@@ -374,7 +373,7 @@ impl Noise {
         let mut from = 0;
         let mut shares = Vec::new();
         for log in logs {
-            shares.push(slow_share(&pull[from..from + log.len()], log.grid.step_s));
+            shares.push(share_below(SLOW_HZ, &pull[from..from + log.len()], log.grid.step_s));
             from += log.len();
         }
         self.temper = (shares.iter().sum::<f64>() / shares.len().max(1) as f64).max(1.0);
@@ -422,24 +421,6 @@ fn cycles_resolved(slides: &[bool], swings: &[bool]) -> Vec<bool> {
     let fast = |i: usize| near(&changes, i) > 4 || near(&swings, i) > reach;
     let fast: Vec<f64> = (0..slides.len()).map(|i| f64::from(u8::from(fast(i)))).collect();
     local_maximum(&fast, reach).into_iter().map(|fast| fast == 0.0).collect()
-}
-
-/// Mean spectral density below [`SLOW_HZ`] over that of all.
-pub(crate) fn slow_share(values: &[f64], step_s: f64) -> f64 {
-    share_below(SLOW_HZ, values, step_s)
-}
-
-/// Mean spectral density below a frequency over that of all: from the variance of means over blocks of half a period of it,
-/// which is its spectral window.
-pub(crate) fn share_below(hz: f64, values: &[f64], step_s: f64) -> f64 {
-    let block = (0.5 / (hz * step_s)).round().max(1.0) as usize;
-    let all = values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
-    let (mut sum, mut count) = (0.0, 0);
-    for chunk in values.chunks_exact(block) {
-        sum += chunk.iter().sum::<f64>().powi(2) / block as f64;
-        count += 1;
-    }
-    if all > 0.0 && count > 0 { sum / f64::from(count) / all } else { 1.0 }
 }
 
 #[cfg(test)]

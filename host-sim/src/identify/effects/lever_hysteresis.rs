@@ -16,13 +16,30 @@ pub(super) struct LeverHysteresis;
 const FORCE: &str = "usual_force_n";
 const CARRIED: &str = "usual_carried_force_n";
 const TORQUE: &str = "usual_torque_nm";
+const SHARE: &str = "usual_share";
 /// Shortest width of the play, in shares of the usual force or torque; the longest, of what it goes over: a wider one slides both
 /// ways on less than half of it, and is a spring.
 const SHORTEST: f64 = 0.01;
 const LONGEST: f64 = 0.25;
 
+/// The force counts in shares of itself down to this share of the usual one, below which the elements come off.
+const LEAST_LOAD: f64 = 0.1;
+
 /// What lags.
-type Signal = fn(&NormalLoadLog) -> &[f64];
+struct Lagging<'l> {
+    /// Name of the form.
+    form: &'static str,
+    /// Unit of the widths, as names have it.
+    unit: &'static str,
+    /// What is shown over it.
+    within: &'static str,
+    /// Its usual size.
+    usual: f64,
+    /// The signal in a log.
+    signal: &'l dyn Fn(&NormalLoadLog) -> Vec<f64>,
+    /// The friction that limits the lag grows with the force.
+    grows: bool,
+}
 
 impl Effect for LeverHysteresis {
     fn about(&self) -> About {
@@ -35,47 +52,82 @@ impl Effect for LeverHysteresis {
 
     fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let s = view.scales;
+        let relative = |force_n: f64| (force_n / s.load_n).max(LEAST_LOAD);
+        let ln_carried = |log: &NormalLoadLog| log.carried_n.iter().map(|n| relative(*n).ln()).collect();
         // The joints yield with the force that they carry, or with the torque before them: the force rings after a step,
         // the torque does not. Each swing of a ring slips in the joints, and the force's noise hides it: the torque has less, and
-        // says how the force rings.
-        let over = |form: &str, [unit, within]: [&'static str; 2], usual: f64, signal: Signal| {
+        // says how the force rings. Where the force itself presses the joints their friction grows with it: it is a share of the
+        // force that lags.
+        let forms = [
+            Lagging {
+                form: FORCE,
+                unit: "n",
+                within: "force within the band, N",
+                usual: s.load_n,
+                signal: &|log| log.smoothed_n.clone(),
+                grows: false,
+            },
+            Lagging {
+                form: CARRIED,
+                unit: "n",
+                within: "carried force within the band, N",
+                usual: s.load_n,
+                signal: &|log| log.carried_n.clone(),
+                grows: false,
+            },
+            Lagging {
+                form: TORQUE,
+                unit: "nm",
+                within: "torque within the band, N m",
+                usual: s.torque_nm,
+                signal: &|log| log.smoothed_torque_nm.clone(),
+                grows: false,
+            },
+            Lagging {
+                form: SHARE,
+                unit: "share",
+                within: "carried force within the band over the usual one",
+                usual: 1.0,
+                signal: &ln_carried,
+                grows: true,
+            },
+        ];
+        let over = |lagging: &Lagging<'_>| {
+            let signals: Vec<Vec<f64>> = view.logs.iter().map(lagging.signal).collect();
             // A stop remembers peaks: noise makes some, and a filter that is the same everywhere cuts those that are.
             let column = |width: f64| {
-                view.logs.iter().flat_map(|log| log.filtered(&stop(signal(log), width))).collect()
+                let of = |(log, signal): (&NormalLoadLog, &Vec<f64>)| {
+                    let mut within = stop(signal, width);
+                    if lagging.grows {
+                        within.iter_mut().zip(&log.carried_n).for_each(|(share, n)| *share *= relative(*n));
+                    }
+                    log.filtered(&within)
+                };
+                view.logs.iter().zip(&signals).flat_map(of).collect()
             };
             let stops = Stops {
                 effect: self.id(),
                 size: 0.5 * s.torque_nm,
-                units: [unit, "nm"],
+                units: [lagging.unit, "nm"],
                 column: &column,
-                deflection: Some(within),
+                deflection: Some(lagging.within),
             };
             let found = match view.fixed {
                 Some(fixed) => stops.of_constants(fixed),
                 None => {
-                    let goes_over = view.logs.iter().map(|log| travel(signal(log).iter().copied()));
-                    let longest = LONGEST * goes_over.fold(usual, f64::max);
-                    stops.searched(view.balance, view.company, &coarse([SHORTEST * usual, longest]))
+                    let goes_over = signals.iter().map(|signal| travel(signal.iter().copied()));
+                    let longest = LONGEST * goes_over.fold(lagging.usual, f64::max);
+                    stops.searched(view.balance, view.company, &coarse([SHORTEST * lagging.usual, longest]))
                 }
             };
             let mut constants = found.constants;
             // Which of the forms, as a constant: held-out logs take the one that was found.
-            constants.push((form.into(), usual));
-            Alternative { form: form.into(), constants, ..found }
+            constants.push((lagging.form.into(), lagging.usual));
+            Alternative { form: lagging.form.into(), constants, ..found }
         };
         let wanted = |form: &str| view.fixed.is_none_or(|fixed| fixed.iter().any(|(name, _)| name == form));
-        let mut all = Vec::new();
-        if wanted(FORCE) {
-            all.push(over(FORCE, ["n", "force within the band, N"], s.load_n, |log| &log.smoothed_n));
-        }
-        if wanted(CARRIED) {
-            let words = ["n", "carried force within the band, N"];
-            all.push(over(CARRIED, words, s.load_n, |log| &log.carried_n));
-        }
-        if wanted(TORQUE) {
-            let words = ["nm", "torque within the band, N m"];
-            all.push(over(TORQUE, words, s.torque_nm, |log| &log.smoothed_torque_nm));
-        }
+        let mut all: Vec<Alternative> =
+            forms.iter().filter(|lagging| wanted(lagging.form)).map(over).collect();
         all.extend(self.spring(view));
         all
     }
@@ -161,6 +213,55 @@ mod tests {
         log.set_signal(Signal::NormalForce, forces);
         log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
         log
+    }
+
+    /// Joints that the force itself presses: a share of it lags, at every load.
+    #[test]
+    fn friction_that_grows_with_the_force_leaves_a_share_of_it_behind() {
+        const LAGS: f64 = 0.03;
+        const WIDTH: f64 = 0.04;
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        // Loops between levels that differ, slower than the mode.
+        let carried = |i: usize| {
+            let t = 1e-3 * i as f64;
+            60.0 + 35.0 * (0.9 * t).sin() + 15.0 * (3.7 * t).sin()
+        };
+        let carried: Vec<f64> = (0..COUNT).map(carried).collect();
+        let mut slips = 0.0f64;
+        let force = carried.windows(2).map(|pair| {
+            slips = (slips + (pair[1] / pair[0]).ln()).clamp(-WIDTH, WIDTH);
+            pair[1] * (1.0 - LAGS * slips / WIDTH)
+        });
+        let force: Vec<f64> = std::iter::once(carried[0]).chain(force).collect();
+        let (of_torque, of_force) = (white(COUNT, 1), white(COUNT, 2));
+        let torque = carried.iter().map(|n| (n + rig.preload_n) / rig.lever_gain_n_per_nm);
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..COUNT).map(|i| 1e-3 * i as f64).collect());
+        log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
+        log.set_signal(Signal::M1Torque, torque.zip(&of_torque).map(|(nm, w)| nm + 0.002 * w).collect());
+        log.set_signal(Signal::NormalForce, force.iter().zip(&of_force).map(|(n, w)| n + 0.1 * w).collect());
+        log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
+        let contact = ContactLog::new(&log, &rig).unwrap();
+        let logs = [NormalLoadLog::new(&contact, &rig).unwrap()];
+        let left = left_by_form(&logs, &rig);
+        let of = |form: &str| left.iter().find(|(known, _)| known == form).unwrap().1;
+        let least = [FORCE, CARRIED, TORQUE].into_iter().map(of).fold(f64::INFINITY, f64::min);
+        assert!(of(SHARE) < 0.5 * least, "{left:?}");
+    }
+
+    /// What each form leaves of a log's balance.
+    fn left_by_form(logs: &[NormalLoadLog], rig: &RigFile) -> Vec<(String, f64)> {
+        let scales = NormalLoadScales::new(logs);
+        let balance = balance(logs, rig, &scales);
+        let residual = balance.solve(&[], &[]).residual;
+        let company = Company { forms: &[], residual: &residual };
+        let view = NormalLoadView { logs, scales: &scales, balance: &balance, company, fixed: None };
+        let forms = LeverHysteresis.normal_load(&view);
+        let left = forms.iter().map(|form| {
+            let solved = balance.solve_forms(&[form]);
+            (form.form.clone(), balance.rms(&solved.residual) / balance.rms(&residual))
+        });
+        left.collect()
     }
 
     #[test]
