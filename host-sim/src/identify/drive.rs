@@ -85,7 +85,7 @@ pub struct DriveLog {
     /// Width of the filter, samples.
     pub width: f64,
     /// Noise of the inertial torque behind the filter.
-    pub inertial_noise: f64,
+    pub inertial_noise: Vec<f64>,
 }
 
 impl DriveLog {
@@ -137,16 +137,20 @@ impl DriveLog {
         let friction_noise = friction.as_ref().map(|f| noise_at_rest(f, deviation_of(contact, f)));
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
         let (angle_noise, effort_noise) = (deviation_of(contact, &position), deviation_of(contact, &effort));
-        let inertial =
-            |width: f64| inertia * angle_noise * curvature_passed(width, contact) / grid.step_s.powi(2);
+        let jitter_s = noise::jitter(&position) * grid.step_s;
+        let of_angle = |noise: f64, passed: f64| inertia * noise * passed / grid.step_s.powi(2);
+        let usual_speed = rms(&gaussian(&position, WIDTHS[0], 1)) / grid.step_s;
+        let inertial = |width: f64| {
+            let of_time = of_angle(jitter_s * usual_speed, white_curvature(width));
+            of_angle(angle_noise, curvature_passed(width, contact)).hypot(of_time)
+        };
         let fits = |width: &f64| inertial(*width) < 0.5 * effort_noise * white_share(*width);
         let (narrowest, widest) = (if contact { WIDTHS[2] } else { WIDTHS[0] }, WIDTHS[5]);
-        let (width, inertial_noise) = if inertia.is_finite() {
+        let width = if inertia.is_finite() {
             // A wider one would take out what ripples; what the acceleration's noise then makes is a noise of its own.
-            let width = WIDTHS.into_iter().find(fits).unwrap_or(WIDE_ENOUGH).max(narrowest);
-            (width, inertial(width))
+            WIDTHS.into_iter().find(fits).unwrap_or(WIDE_ENOUGH).max(narrowest)
         } else {
-            (widest, 0.0)
+            widest
         };
         let dt = grid.step_s;
         let small = |width: &f64| {
@@ -155,7 +159,14 @@ impl DriveLog {
         let quick_width = QUICK.into_iter().find(small).unwrap_or(width).min(width);
         let quick_acceleration = gaussian(&position, quick_width, 2).iter().map(|d| d / (dt * dt)).collect();
         let quick = [gaussian(&effort, quick_width, 0), quick_acceleration];
-        let speed = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
+        let speed: Vec<f64> = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
+        let inertial_noise = if inertia.is_finite() {
+            let own = of_angle(angle_noise, curvature_passed(width, contact));
+            let per_speed = of_angle(jitter_s, white_curvature(width));
+            speed.iter().map(|v| own.hypot(per_speed * v)).collect()
+        } else {
+            vec![0.0; speed.len()]
+        };
         let acceleration = gaussian(&position, width, 2).iter().map(|d| d / (dt * dt)).collect();
         Self {
             source,
@@ -211,9 +222,13 @@ pub fn coordinates(logs: &[DriveLog], rotary: bool) -> Vec<(String, Vec<f64>)> {
 /// of a count at worst, all at the frequency that the filter passes best. A speed loop that swings by half a count repeats it.
 /// A drive alone is looked at for its ripple, which a filter that is wide enough for that would take out.
 fn curvature_passed(width: f64, contact: bool) -> f64 {
-    let white = (0.375 / (std::f64::consts::PI.sqrt() * width.powi(5))).sqrt();
     let tonal = 2.0 / (std::f64::consts::E * width * width);
-    if contact { white.max(tonal) } else { white }
+    if contact { white_curvature(width).max(tonal) } else { white_curvature(width) }
+}
+
+/// The same of white noise.
+fn white_curvature(width: f64) -> f64 {
+    (0.375 / (std::f64::consts::PI.sqrt() * width.powi(5))).sqrt()
 }
 
 /// Noise of a channel. Beside a contact it is what the channel shows in its quiet stretches; a drive alone may ripple
@@ -434,7 +449,7 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     );
     let (rest, form) = (rests.clone(), LEAST_NOISE * scales.own);
     let noise =
-        move |i: usize| vec![of_effort, if rest[i] { 0.0 } else { of_bridge }, log.inertial_noise, form];
+        move |i: usize| vec![of_effort, if rest[i] { 0.0 } else { of_bridge }, log.inertial_noise[i], form];
     let guessed = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
         let folded = folded * swings[i].hypot(friction_swings[i]);

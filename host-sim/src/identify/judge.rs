@@ -225,7 +225,8 @@ fn of_contact_logs(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Found, InputError> {
     let logs = ContactLog::all(train, rig, &baseline(model, KNOWN_WITHIN).numbers)?;
-    let mut notes: Vec<String> = train.iter().filter_map(speed_note).collect();
+    let mut notes: Vec<String> =
+        train.iter().zip(&logs).filter_map(|(log, seen)| speed_note(log, seen.jitter_s)).collect();
     notes.extend(logs.iter().filter_map(|log| ring_note(log, rig)));
     progress("drive");
     let drive = Motors::search_drive(rig, &logs);
@@ -253,8 +254,15 @@ fn of_contact_logs(
     Ok(Found { contact: Some(contact), drive, normal_load, notes })
 }
 
-/// What is said of a log whose speed is not used.
-fn speed_note(log: &Log) -> Option<String> {
+/// What is said of a log whose speed is not used, or the instants of whose angle jitter by so much.
+fn speed_note(log: &Log, jitter_s: Option<f64>) -> Option<String> {
+    if let Some(jitter_s) = jitter_s {
+        return Some(format!(
+            "{}: the instants at which m2_angle_rad was taken are {:.0} µs off time_s; what is fast is taken from m2_speed_rad_s",
+            log.source,
+            1e6 * jitter_s,
+        ));
+    }
     let Lag { lag_s, std_s } = log.speed_lag()?;
     Some(format!(
         "{}: m2_speed_rad_s is {:.2} ± {:.2} ms {} m2_angle_rad; the slope of the angle is used in its place",

@@ -18,10 +18,14 @@ const DEVIATE: f64 = -0.6745;
 /// Standard deviation of the noise of a channel, not below that of its own resolution (a channel that
 /// stands still on one count is not without noise); 0 where it has neither.
 pub fn standard_deviation(values: &[f64]) -> f64 {
-    let smallest =
-        values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::MAX, f64::min);
-    let resolution = if smallest < f64::MAX { smallest / 12f64.sqrt() } else { 0.0 };
-    quiet_deviation(values).max(resolution)
+    quiet_deviation(values).max(resolution(values))
+}
+
+/// Deviation of what a channel's smallest step rounds.
+fn resolution(values: &[f64]) -> f64 {
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
+    let smallest = steps.fold(f64::MAX, f64::min);
+    if smallest < f64::MAX { smallest / 12f64.sqrt() } else { 0.0 }
 }
 
 /// As [`standard_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
@@ -34,24 +38,66 @@ pub fn white_deviation(values: &[f64]) -> f64 {
 /// As [`white_deviation`] by fourth differences, for a drive's own channels: their noise is not white, and the quietest part of
 /// its spectrum says less than what it does from sample to sample. What swings near a quarter of the sampling rate counts.
 pub fn difference_deviation(values: &[f64]) -> f64 {
-    // Sum of the squared binomial coefficients 1, 4, 6, 4, 1.
-    const SQUARES: f64 = 70.0;
-    let differences: Vec<f64> =
-        values.windows(5).map(|x| x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).collect();
-    let mut variances: Vec<f64> = differences
-        .chunks(WINDOW)
-        .map(|chunk| chunk.iter().map(|d| d * d).sum::<f64>() / (SQUARES * chunk.len() as f64))
-        .collect();
+    let mut variances: Vec<f64> = windows_of_differences(values).map(|(variance, _)| variance).collect();
     if variances.is_empty() {
         return standard_deviation(values);
     }
-    let middle = variances.len() / 2;
-    variances.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt().min(standard_deviation(values))
+    median(&mut variances).sqrt().min(standard_deviation(values))
 }
 
-/// Deviation in the quiet windows.
+/// Variance of white noise in the windows of a channel by fourth differences, which leave out what is slow, and its mean change
+/// from sample to sample.
+fn windows_of_differences(values: &[f64]) -> impl Iterator<Item = (f64, f64)> + '_ {
+    // Sum of the squared binomial coefficients 1, 4, 6, 4, 1.
+    const SQUARES: f64 = 70.0;
+    let difference = |x: &[f64]| x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4];
+    let windows = (0..values.len().saturating_sub(4)).step_by(WINDOW);
+    windows.map(move |from| {
+        let window = &values[from..(from + WINDOW + 4).min(values.len())];
+        let count = (window.len() - 4) as f64;
+        let variance = window.windows(5).map(|x| difference(x).powi(2)).sum::<f64>() / (SQUARES * count);
+        (variance, (window[window.len() - 1] - window[0]) / (count + 3.0))
+    })
+}
+
+/// Middle one of some values.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Deviation of the instants at which a position was taken from those of the samples, in samples: by as much its noise grows with
+/// speed, in the faster half of the windows over the slower one. 0 where it does not.
+pub fn jitter(position: &[f64]) -> f64 {
+    let mut windows: Vec<(f64, f64)> = windows_of_differences(position).collect();
+    windows.sort_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    let (slow, fast) = windows.split_at(windows.len() / 2);
+    if slow.is_empty() {
+        return 0.0;
+    }
+    let medians = |half: &[(f64, f64)]| {
+        let [mut variances, mut squares]: [Vec<f64>; 2] =
+            [half.iter().map(|w| w.0).collect(), half.iter().map(|w| w.1 * w.1).collect()];
+        [median(&mut variances), median(&mut squares)]
+    };
+    let ([still, slow], [moving, fast]) = (medians(slow), medians(fast));
+    // A count rounds nothing where it stands.
+    let more = moving - still.max(resolution(position).powi(2));
+    if fast > slow { (more.max(0.0) / (fast - slow)).sqrt() } else { 0.0 }
+}
+
+/// Deviation in the quiet windows. Where a channel stands at the largest or the smallest value of its record it may be at an end of
+/// its range, which cuts its noise too: a window that it holds for a quarter says nothing.
 fn quiet_deviation(values: &[f64]) -> f64 {
-    let mut variances: Vec<f64> = values.chunks_exact(WINDOW).map(detrended_variance).collect();
+    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_free =
+        |window: &&[f64]| 4 * window.iter().filter(|x| **x == lowest || **x == highest).count() < WINDOW;
+    let windows = || values.chunks_exact(WINDOW);
+    let mut variances: Vec<f64> = windows().filter(is_free).map(detrended_variance).collect();
+    if variances.is_empty() {
+        variances = windows().map(detrended_variance).collect();
+    }
     if variances.is_empty() {
         return detrended_variance(values).sqrt();
     }
@@ -145,6 +191,18 @@ pub(in crate::identify) mod tests {
     }
 
     #[test]
+    fn an_end_of_the_range_hides_no_noise() {
+        // Two fifths of the time at the end, and the noise in front of the converter.
+        let values: Vec<f64> = white(20_000, 2)
+            .iter()
+            .enumerate()
+            .map(|(i, e)| (2.0 * (1e-3 * i as f64).sin() + 0.02 * e).clamp(-1.2, 1.2))
+            .collect();
+        let found = standard_deviation(&values);
+        assert!((found / 0.02 - 1.0).abs() < 0.06, "{found}");
+    }
+
+    #[test]
     fn a_swing_in_every_window_is_no_white_noise() {
         for omega in [0.2, 1.5, 2.6] {
             let values: Vec<f64> = white(20_000, 3)
@@ -160,6 +218,24 @@ pub(in crate::identify) mod tests {
             }
             assert!(standard_deviation(&values) > 0.1);
         }
+    }
+
+    #[test]
+    fn instants_that_jitter_show_in_how_a_positions_noise_grows_with_speed() {
+        const COUNT_RAD: f64 = 5e-5;
+        let position = |jitter: f64| -> Vec<f64> {
+            let (at, read) = (white(20_000, 3), white(20_000, 4));
+            let taken = at.iter().enumerate().map(|(i, e)| i as f64 + jitter * e);
+            // To and fro at up to 5 rad/s, in counts of a noisy encoder.
+            let angle = taken.map(|t| 10.0 * (5e-4 * t).sin());
+            angle.zip(&read).map(|(x, e)| (x / COUNT_RAD + 0.3 * e).round() * COUNT_RAD).collect()
+        };
+        let found = jitter(&position(0.03));
+        assert!((found / 0.03 - 1.0).abs() < 0.1, "{found}");
+        assert!(jitter(&position(0.0)) < 0.002, "{}", jitter(&position(0.0)));
+        // Standing still, it has nothing to show.
+        assert_eq!(jitter(&[1.0; 500]), 0.0);
+        assert_eq!(jitter(&[1.0; 3]), 0.0);
     }
 
     #[test]

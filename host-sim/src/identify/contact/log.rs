@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::motion::{Motion, Speed};
 use super::observer::{SLIP_NOISES, slip_noise_m_s};
 use super::problem::Numbers;
 use super::ringing::Ringing;
@@ -15,10 +16,6 @@ use crate::identify::mains;
 use crate::identify::noise;
 use crate::input_error::InputError;
 use crate::predict::BridgeModel;
-
-/// Width of the Gaussian over which speed column and angle are blended, samples: above it the speed column is the
-/// quieter, below it the angle.
-const BLEND: f64 = 12.0;
 
 /// Signals of a contact log on an even grid, SI units.
 #[derive(Debug, Clone)]
@@ -71,6 +68,8 @@ pub struct ContactLog {
     pub normal_noise_n: f64,
     /// Noise of the root's speed from sample to sample, m/s.
     pub speed_noise_m_s: f64,
+    /// By how much the instants of the disc's logged angle jitter, s, where its speed was used for what is fast.
+    pub jitter_s: Option<f64>,
     /// What is left of a jump as ringing that samples are too far apart to show: its RMS at the jump over the jump, and the share
     /// that is left a sample on. `None` where they show it.
     pub unseen_ringing: Option<(f64, f64)>,
@@ -102,9 +101,12 @@ impl ContactLog {
         let normal_noise_n = grid.noise(&logged_n, signals.normal_force_n);
         let [friction_nm, normal_n] = [&logged_nm, &logged_n].map(|logged| mains::without(logged, step_s));
 
-        let speed_column = log.speed_in_time().map(&on_grid);
+        let lag_s = log.speed_lag().map_or(0.0, |lag| lag.lag_s);
+        let speed_column =
+            log.signal(Signal::M2Speed).map(|speed| Speed { values_rad_s: on_grid(speed), lag_s });
         let angle_column = log.signal(Signal::M2Angle).map(|angle| on_grid(&unwrapped(angle)));
-        let (angle_rad, speed_noise) = motion(&grid, speed_column.as_deref(), angle_column.as_deref());
+        let Motion { angle_rad, slope_noise_rad_s, jitter_s } =
+            Motion::new(&grid, speed_column.as_ref(), angle_column.as_deref());
         let radius_m = rig.friction_radius_m;
         let root_m: Vec<f64> = angle_rad.iter().map(|a| radius_m * a).collect();
         let speed: Vec<f64> = gradient(&root_m).iter().map(|d| d / step_s).collect();
@@ -127,7 +129,8 @@ impl ContactLog {
             unseen_ringing: unseen_ringing(&rig.friction_bridge, step_s),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
-            speed_noise_m_s: radius_m * speed_noise,
+            speed_noise_m_s: radius_m * slope_noise_rad_s,
+            jitter_s,
             m1_torque_nm: optional(Signal::M1Torque),
             m1_angle_rad: optional(Signal::M1Angle),
             m2_torque_nm: optional(Signal::M2Torque),
@@ -253,33 +256,6 @@ fn unseen_ringing(bridge: &Bridge, step_s: f64) -> Option<(f64, f64)> {
 
 fn magnitudes(values: &[f64]) -> Vec<f64> {
     values.iter().map(|x| x.abs()).collect()
-}
-
-/// Angle of the disc from both columns, and the noise of its slope, rad/s.
-fn motion(grid: &Grid, speed: Option<&[f64]>, angle: Option<&[f64]>) -> (Vec<f64>, f64) {
-    let step_s = grid.step_s;
-    let noise = |values: &[f64]| noise::standard_deviation(values);
-    let slope_noise = |angle: &[f64]| std::f64::consts::SQRT_2 * noise(angle) / step_s;
-    let integrated = |speed: &[f64]| {
-        let mut sum = 0.0;
-        let mut sums = vec![0.0; speed.len()];
-        for i in 1..speed.len() {
-            sum += 0.5 * (speed[i] + speed[i - 1]) * step_s;
-            sums[i] = sum;
-        }
-        sums
-    };
-    match (speed, angle) {
-        (Some(speed), None) => (integrated(speed), noise(speed)),
-        (Some(speed), Some(angle)) if noise(speed) < slope_noise(angle) => {
-            let from_speed = integrated(speed);
-            let off: Vec<f64> = from_speed.iter().zip(angle).map(|(s, a)| s - a).collect();
-            let off = gaussian(&off, BLEND, 0);
-            (from_speed.iter().zip(off).map(|(s, off)| s - off).collect(), noise(speed))
-        }
-        (_, Some(angle)) => (angle.to_vec(), slope_noise(angle)),
-        (None, None) => (vec![0.0; grid.len()], 0.0),
-    }
 }
 
 /// Smoothed over many samples where the signal is steady, over few where it moves: the weight follows how far two

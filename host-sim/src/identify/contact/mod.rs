@@ -6,6 +6,7 @@ pub mod change;
 pub mod channel;
 pub mod law;
 pub mod log;
+mod motion;
 pub(in crate::identify) mod noise;
 pub mod observer;
 pub mod problem;

@@ -6,10 +6,25 @@ use model_core::extension::direction_asymmetry::DirectionAsymmetry as Law;
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
+use crate::identify::contact::log::ContactLog;
 use crate::identify::term::{Parameter, Starts};
 
 /// The effect.
 pub(super) struct DirectionAsymmetry;
+
+/// Share of the way that is slid in the lesser direction where the logs tell the two apart: in logs of one direction, its columns
+/// are curves over the speed.
+const BOTH_WAYS: f64 = 0.02;
+
+/// Whether the training logs slide in both directions.
+fn slides_both_ways(view: &ContactView<'_>) -> bool {
+    let slid_m = |sign: f64| -> f64 {
+        let of = |log: &ContactLog| log.root_speed_m_s.iter().map(|v| (sign * v).max(0.0) * log.grid.step_s).sum::<f64>();
+        view.logs.iter().map(of).sum()
+    };
+    let ways = [-1.0, 1.0].map(slid_m);
+    ways[0].min(ways[1]) > BOTH_WAYS * (ways[0] + ways[1])
+}
 
 impl Effect for DirectionAsymmetry {
     fn about(&self) -> About {
@@ -21,6 +36,9 @@ impl Effect for DirectionAsymmetry {
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
+        if view.training && !slides_both_ways(view) {
+            return Vec::new();
+        }
         let by_speed = |n: i32| {
             let of = |c: &super::Coordinates| c.direction.iter().zip(&c.log_speed).map(|(d, v)| d * v.powi(n)).collect();
             view.coordinates.iter().map(of).collect()
