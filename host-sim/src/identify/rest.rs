@@ -487,7 +487,7 @@ mod tests {
         let rows: Vec<usize> = (0..ROWS).collect();
         let noise = Noise::white(vec![0.1; ROWS]);
         let residual = |blows: usize| -> Vec<f64> {
-            let blow = |i: usize| if i % (ROWS / blows) == 0 { 30.0 } else { 0.1 };
+            let blow = |i: usize| if i.is_multiple_of(ROWS / blows) { 30.0 } else { 0.1 };
             (0..ROWS).map(|i| blow(i) * if i % 2 == 0 { 1.0 } else { -1.0 }).collect()
         };
         let rest = |blows: usize| structured(&residual(blows), &noise, &rows, 1, 0.0).0;
