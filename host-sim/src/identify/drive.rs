@@ -134,7 +134,7 @@ impl DriveLog {
         inertia: f64,
     ) -> Self {
         let contact = friction.is_some();
-        let friction_noise = friction.as_ref().map(|f| noise_at_rest(f, deviation_of(contact, f)));
+        let friction_noise = friction.as_ref().map(|f| noise_at_rest(f, noise::bridge_deviation(f)));
         // Noise of the acceleration falls with the 2.5th power of the width, that of the torque with its root.
         let (angle_noise, effort_noise) = (deviation_of(contact, &position), deviation_of(contact, &effort));
         let jitter_s = noise::jitter(&position) * grid.step_s;
@@ -433,9 +433,9 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let swings = steps(&log.effort, log.width);
     let friction_swings = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| steps(f, log.width));
     let folded = BETWEEN_SAMPLES * white_share(log.width);
-    let white = |values: &[f64]| deviation_of(contact, values) * white_share(log.width);
-    let of_effort = white(&log.effort);
-    let of_bridge = log.friction.as_ref().map_or(0.0, |friction| white(friction));
+    let passed = white_share(log.width);
+    let of_effort = deviation_of(contact, &log.effort) * passed;
+    let of_bridge = log.friction.as_ref().map_or(0.0, |friction| noise::bridge_deviation(friction) * passed);
     // Where the torque rests the base may leave the bridge's noise out: how much of it is then in a row the residuals tell, between
     // all of it and what its means have.
     let in_means = (white_share(WIDEST_MEAN) / white_share(log.width)).min(1.0).powi(2);

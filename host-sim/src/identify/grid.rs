@@ -101,11 +101,11 @@ impl Grid {
         }
     }
 
-    /// Standard deviation of a channel's noise on the grid.
+    /// Standard deviation of a bridge's noise on the grid.
     pub fn noise(&self, values_on_grid: &[f64], values: &[f64]) -> f64 {
         match &self.way {
-            Way::Between(_) => noise::standard_deviation(values),
-            _ => noise::standard_deviation(values_on_grid),
+            Way::Between(_) => noise::bridge_deviation(values),
+            _ => noise::bridge_deviation(values_on_grid),
         }
     }
 

@@ -18,7 +18,17 @@ const DEVIATE: f64 = -0.6745;
 /// Standard deviation of the noise of a channel, not below that of its own resolution (a channel that
 /// stands still on one count is not without noise); 0 where it has neither.
 pub fn standard_deviation(values: &[f64]) -> f64 {
-    quiet_deviation(values).max(resolution(values))
+    quiet_deviation(values, |_| true).max(resolution(values))
+}
+
+/// As [`standard_deviation`] for a bridge. Where it stands at the largest or the smallest value of its record it may be at an end of
+/// its range, which cuts its noise too: a window that it holds for a quarter says nothing. An encoder that rests is quiet.
+pub fn bridge_deviation(values: &[f64]) -> f64 {
+    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let at_end = |x: &&f64| **x == lowest || **x == highest;
+    let is_free = |window: &[f64]| 4 * window.iter().filter(at_end).count() < WINDOW;
+    quiet_deviation(values, is_free).max(resolution(values))
 }
 
 /// Deviation of what a channel's smallest step rounds.
@@ -28,10 +38,10 @@ fn resolution(values: &[f64]) -> f64 {
     if smallest < f64::MAX { smallest / 12f64.sqrt() } else { 0.0 }
 }
 
-/// As [`standard_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
+/// As [`bridge_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
 /// as noise: from the quietest part of its spectrum.
 pub fn white_deviation(values: &[f64]) -> f64 {
-    let usual = standard_deviation(values);
+    let usual = bridge_deviation(values);
     Spectrum::new(values).map_or(usual, |spectrum| spectrum.white_deviation().min(usual))
 }
 
@@ -86,15 +96,10 @@ pub fn jitter(position: &[f64]) -> f64 {
     if fast > slow { (more.max(0.0) / (fast - slow)).sqrt() } else { 0.0 }
 }
 
-/// Deviation in the quiet windows. Where a channel stands at the largest or the smallest value of its record it may be at an end of
-/// its range, which cuts its noise too: a window that it holds for a quarter says nothing.
-fn quiet_deviation(values: &[f64]) -> f64 {
-    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let is_free =
-        |window: &&[f64]| 4 * window.iter().filter(|x| **x == lowest || **x == highest).count() < WINDOW;
+/// Deviation in the quiet ones of these windows, or of all where there is none.
+fn quiet_deviation(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
     let windows = || values.chunks_exact(WINDOW);
-    let mut variances: Vec<f64> = windows().filter(is_free).map(detrended_variance).collect();
+    let mut variances: Vec<f64> = windows().filter(|window| counts(window)).map(detrended_variance).collect();
     if variances.is_empty() {
         variances = windows().map(detrended_variance).collect();
     }
@@ -198,7 +203,7 @@ pub(in crate::identify) mod tests {
             .enumerate()
             .map(|(i, e)| (2.0 * (1e-3 * i as f64).sin() + 0.02 * e).clamp(-1.2, 1.2))
             .collect();
-        let found = standard_deviation(&values);
+        let found = bridge_deviation(&values);
         assert!((found / 0.02 - 1.0).abs() < 0.06, "{found}");
     }
 
@@ -241,7 +246,7 @@ pub(in crate::identify) mod tests {
     #[test]
     fn a_channel_without_noise_has_none() {
         let values: Vec<f64> = (0..5000).map(|i| 1e-3 * f64::from(i)).collect();
-        assert!(quiet_deviation(&values) < 1e-12);
+        assert!(quiet_deviation(&values, |_| true) < 1e-12);
         // Counts of an encoder that hardly moves: that of a count.
         let counts: Vec<f64> = (0..5000).map(|i| if i < 2500 { 1.0 } else { 1.5 }).collect();
         assert_eq!(standard_deviation(&counts), 0.5 / 12f64.sqrt());
