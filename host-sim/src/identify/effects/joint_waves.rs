@@ -144,19 +144,36 @@ impl<'a> Joint<'a> {
         found
     }
 
+    /// Columns of what is known, and of these waves.
+    fn columns_of(&self, orders: &[f64]) -> Vec<Vec<f64>> {
+        let waves = orders.iter().flat_map(|k| self.apart(&self.wave(*k)));
+        self.known.iter().cloned().chain(waves).collect()
+    }
+
+    /// What columns explain, and their values.
+    fn solved(&self, columns: &[Vec<f64>]) -> (f64, DVector<f64>) {
+        let (h, g) = linear::normal_equations(columns, &self.weight, &self.y);
+        let p = linear::factor(&ridged(h)).solve(&g);
+        (g.dot(&p), p)
+    }
+
+    /// The steepest slope of a single one of these waves, fitted together, per unit of the position.
+    pub fn steepest(&self, orders: &[f64]) -> f64 {
+        let (_, p) = self.solved(&self.columns_of(orders));
+        let slopes = orders.iter().enumerate().flat_map(|(at, k)| {
+            let from = self.known.len() + 2 * at * self.stretches.len();
+            let of_stretch = move |stretch| (from + 2 * stretch, *k);
+            (0..self.stretches.len()).map(of_stretch)
+        });
+        slopes.map(|(at, k)| k * p[at].hypot(p[at + 1])).fold(0.0, f64::max)
+    }
+
     /// These wave numbers moved to where the waves together leave least, by Gauss–Newton, no further than half of the step between
     /// two that are tried, and not below the lowest of those.
     pub fn sharpened(&self, orders: &[f64], candidates: &Candidates) -> Vec<f64> {
         let of_wave = 2 * self.stretches.len();
-        let columns_of = |orders: &[f64]| -> Vec<Vec<f64>> {
-            let waves = orders.iter().flat_map(|k| self.apart(&self.wave(*k)));
-            self.known.iter().cloned().chain(waves).collect()
-        };
-        let solved = |columns: &[Vec<f64>]| -> (f64, DVector<f64>) {
-            let (h, g) = linear::normal_equations(columns, &self.weight, &self.y);
-            let p = linear::factor(&ridged(h)).solve(&g);
-            (g.dot(&p), p)
-        };
+        let (columns_of, solved) =
+            (|orders: &[f64]| self.columns_of(orders), |columns: &[Vec<f64>]| self.solved(columns));
         let (within, lowest) =
             (0.5 * candidates.step(), candidates.wave_numbers.first().copied().unwrap_or(0.0));
         let mut best = orders.to_vec();
@@ -294,6 +311,26 @@ mod tests {
         assert!((fine[0] - truth).abs() < 0.5 * 1.37 / 8.0, "{fine:?}");
         // What is left of it is no second wave beside it.
         assert!((fine[1] - fine[0]).abs() > 0.5 * 1.37, "{fine:?}");
+    }
+
+    #[test]
+    fn the_steepest_wave_is_told_where_waves_nearly_cancel_each_other() {
+        const ROWS: usize = 3000;
+        let position: Vec<f64> = (0..2 * ROWS).map(|i| 8e-4 * (i % ROWS) as f64).collect();
+        let noise = white(2 * ROWS, 3);
+        let residual: Vec<f64> = (0..2 * ROWS)
+            .map(|i| {
+                let size = if i < ROWS { 1.0 } else { 0.5 };
+                size * ((20.0 * position[i]).sin() - (21.3 * position[i]).sin()) + 1e-4 * noise[i]
+            })
+            .collect();
+        let base = vec![(Parameter::amplitude("base", 10.0), vec![1.0; 2 * ROWS])];
+        let logs = [white_log(ROWS, 1e-4), white_log(ROWS, 1e-4)];
+        let balance = Balance::new(residual.clone(), base, &logs, 1.0);
+        let joint = Joint::new(&balance, &position, Company { forms: &[], residual: &residual }, true);
+        let steepest = joint.steepest(&[20.0, 21.3]);
+        // Waves of a quarter of a period's difference over the travel are known to a few hundredths.
+        assert!((steepest / 21.3 - 1.0).abs() < 0.03, "{steepest}");
     }
 
     #[test]

@@ -59,11 +59,17 @@ impl Effect for M1Ripple {
             // with a phase for each log may have one phase all the same.
             let joints =
                 [false, true].map(|own| (own, Joint::new(view.balance, &position, view.company, own)));
+            // Where a wave of the torque is steeper than the springs, no position holds: the mechanism jumps from well to well.
+            let torque = waves::travel(view.logs.iter().flat_map(|log| log.smoothed_torque_nm.iter().copied()));
+            let springs = torque / travel.max(f64::MIN_POSITIVE);
             for (apart, searched) in &joints {
                 let orders = searched.orders(&candidates, MOST_ORDERS);
                 for (own_phase, joint) in joints.iter().filter(|(own_phase, _)| *apart || !own_phase) {
                     for count in 1..=orders.len() {
                         let sharpened = joint.sharpened(&orders[..count], &candidates);
+                        if joint.steepest(&sharpened) > springs {
+                            continue;
+                        }
                         let orders: Vec<Wave> = sharpened.into_iter().map(Wave::steady).collect();
                         all.push(make.alternative(&orders, candidates.count(), *own_phase));
                     }
@@ -98,8 +104,9 @@ mod tests {
         log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
         log.set_signal(Signal::M1Torque, series(&|i| carried(i) + 0.005 * noise[0][i]));
         log.set_signal(Signal::M1Angle, series(&angle));
-        // The setpoint does not know of the ripple, the force shows it.
-        let made = |i: usize| carried(i) + 0.2 * (order * angle(i) + phase).sin();
+        // The setpoint does not know of the ripple, the force shows it. It is as steep as three quarters of the springs, 40 N m/rad:
+        // a steeper one would hold the mechanism.
+        let made = |i: usize| carried(i) + 0.05 * (order * angle(i) + phase).sin();
         let force = |i: usize| rig.lever_gain_n_per_nm * made(i) - rig.preload_n;
         log.set_signal(Signal::NormalForce, series(&|i| force(i) + 0.25 * noise[1][i]));
         log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
