@@ -10,15 +10,17 @@ use super::spectrum::Spectrum;
 
 /// Samples of a window.
 pub const WINDOW: usize = 48;
-/// Share of windows taken as quiet.
-const QUANTILE: f64 = 0.25;
-/// Normal deviate of [`QUANTILE`].
-const DEVIATE: f64 = -0.6745;
+/// Share of windows taken as quiet, with its normal deviate.
+const QUIET: (f64, f64) = (0.25, -0.6745);
+/// Share of a bridge's windows that is quiet where a tip slips and sticks in most of them.
+const QUIETEST: (f64, f64) = (0.1, -1.2816);
+/// By noise alone the two shares tell of deviations that are a few hundredths apart in records of some seconds.
+const ALIKE: f64 = 1.25;
 
 /// Standard deviation of the noise of a channel, not below that of its own resolution (a channel that
 /// stands still on one count is not without noise); 0 where it has neither.
 pub fn standard_deviation(values: &[f64]) -> f64 {
-    quiet_deviation(values, |_| true).max(resolution(values))
+    quiet_deviation(values, QUIET, |_| true).max(resolution(values))
 }
 
 /// As [`standard_deviation`] for a bridge. Where it stands at the largest or the smallest value of its record it may be at an end of
@@ -28,7 +30,9 @@ pub fn bridge_deviation(values: &[f64]) -> f64 {
     let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let at_end = |x: &&f64| **x == lowest || **x == highest;
     let is_free = |window: &[f64]| 4 * window.iter().filter(at_end).count() < WINDOW;
-    quiet_deviation(values, is_free).max(resolution(values))
+    let [usual, least] = [QUIET, QUIETEST].map(|quiet| quiet_deviation(values, quiet, is_free));
+    let quiet = if usual < ALIKE * least { usual } else { least };
+    quiet.max(resolution(values))
 }
 
 /// Deviation of what a channel's smallest step rounds.
@@ -97,7 +101,7 @@ pub fn jitter(position: &[f64]) -> f64 {
 }
 
 /// Deviation in the quiet ones of these windows, or of all where there is none.
-fn quiet_deviation(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
+fn quiet_deviation(values: &[f64], (quantile, deviate): (f64, f64), counts: impl Fn(&[f64]) -> bool) -> f64 {
     let windows = || values.chunks_exact(WINDOW);
     let mut variances: Vec<f64> = windows().filter(|window| counts(window)).map(detrended_variance).collect();
     if variances.is_empty() {
@@ -106,9 +110,9 @@ fn quiet_deviation(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
     if variances.is_empty() {
         return detrended_variance(values).sqrt();
     }
-    let rank = ((variances.len() - 1) as f64 * QUANTILE).round() as usize;
+    let rank = ((variances.len() - 1) as f64 * quantile).round() as usize;
     let (_, quiet, _) = variances.select_nth_unstable_by(rank, f64::total_cmp);
-    (*quiet / chi_square_ratio(DEVIATE, (WINDOW - 3) as f64)).sqrt()
+    (*quiet / chi_square_ratio(deviate, (WINDOW - 3) as f64)).sqrt()
 }
 
 /// Quantile of χ²/f at a normal deviate, by Wilson and Hilferty's cube.
@@ -244,9 +248,21 @@ pub(in crate::identify) mod tests {
     }
 
     #[test]
+    fn a_bridge_is_as_noisy_as_where_it_rests_if_it_swings_elsewhere() {
+        let noise = white(20_000, 9);
+        let swing = |i: usize| if i % 5000 < 4200 { (0.9 * i as f64).sin() } else { 0.0 };
+        let values: Vec<f64> = noise.iter().enumerate().map(|(i, e)| swing(i) + 0.01 * e).collect();
+        // Six tenths of the windows that are quiet are quieter than the one that tells.
+        let found = bridge_deviation(&values);
+        assert!((1.0..1.25).contains(&(found / 0.01)), "{found}");
+        // Where it is as noisy everywhere, the usual windows tell.
+        assert_eq!(bridge_deviation(&noise), standard_deviation(&noise));
+    }
+
+    #[test]
     fn a_channel_without_noise_has_none() {
         let values: Vec<f64> = (0..5000).map(|i| 1e-3 * f64::from(i)).collect();
-        assert!(quiet_deviation(&values, |_| true) < 1e-12);
+        assert!(quiet_deviation(&values, QUIET, |_| true) < 1e-12);
         // Counts of an encoder that hardly moves: that of a count.
         let counts: Vec<f64> = (0..5000).map(|i| if i < 2500 { 1.0 } else { 1.5 }).collect();
         assert_eq!(standard_deviation(&counts), 0.5 / 12f64.sqrt());

@@ -45,9 +45,9 @@ const OF_FORCE: std::ops::Range<usize> = 3..7;
 /// Samples of a cycle of slip and stick below which its jumps run into each other: each is uncertain over the smoothing's width
 /// and the two samples beside it, and there are two in a cycle.
 const SAMPLES_PER_CYCLE: usize = 10;
-/// What swings by more than so many deviations of the sensor's noise from one sample to the next, four of such a difference, does not
-/// do so by that noise.
-const SWING_NOISES: f64 = 6.0;
+/// A sample that is off its two neighbours by more than so many deviations of what the sensor's noise makes of that: one of twenty is
+/// by noise alone.
+const SWING_NOISES: f64 = 2.0;
 /// The sensor's noise is known from the channel itself: its variance is at least this share of it.
 const LEAST_SENSOR: f64 = 0.2;
 /// Sources that are errors of the channel, from which the slip is observed too: the sensor's, motion between samples.
@@ -119,7 +119,10 @@ impl Noise {
                 predicted.iter().zip(&wide_change).map(|(p, m)| p.min(3.0 * m + floor)).collect();
             let wide_predicted = local_maximum(&predicted, 6);
             let slides: Vec<bool> = observed.sliding.iter().map(|s| *s > 0.5).collect();
-            resolved.extend(cycles_resolved(&slides, &swings(log, contact)));
+            let unstable = unstable(log, contact);
+            let mut of_log = cycles_resolved(&slides, &swings(log, &unstable));
+            leave_out_between(&mut of_log, &unstable, &cycle_rate(log));
+            resolved.extend(of_log);
             let transition = local_maximum(
                 &magnitude(gradient(&slides.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<f64>>())),
                 4,
@@ -387,18 +390,52 @@ impl Noise {
     }
 }
 
-/// Where the channel swings from sample to sample and slip is unstable: friction falls with speed by more than the block damps
-/// (c_u < −F_N g′), so that what looks like a slide is a cycle of slip and stick, and the slip that is seen is none that was.
-fn swings(log: &ContactLog, contact: &Contact) -> Vec<bool> {
+/// Where slip is unstable: friction falls with speed by more than the block damps (c_u < −F_N g′), so that what looks like a slide is
+/// a cycle of slip and stick, and the slip that is seen is none that was.
+fn unstable(log: &ContactLog, contact: &Contact) -> Vec<bool> {
     let unstable = |i: usize| {
         let (_, rise) = contact.curve.at_with_derivative(log.root_speed_m_s[i].abs());
         let (per_load, film) = contact.viscous;
         let damps = contact.damping_n_s_per_m + per_load * log.load_n[i] + film;
         !contact.bristles_alone && -log.load_n[i] * rise > damps
     };
-    let swing = SWING_NOISES * log.friction_noise_nm;
-    let steps = |i: usize| (log.friction_nm[i] - log.friction_nm[i.saturating_sub(1)]).abs() > swing;
-    (0..log.len()).map(|i| steps(i) && unstable(i)).collect()
+    (0..log.len()).map(unstable).collect()
+}
+
+/// Where the channel swings from sample to sample and slip is unstable. What the sensor smooths away and sampling mirrors leaves little
+/// of a cycle, and a mean that is none of the law's.
+fn swings(log: &ContactLog, unstable: &[bool]) -> Vec<bool> {
+    // Of noise alone the second difference has six times the variance.
+    let swing = SWING_NOISES * 6f64.sqrt() * log.friction_noise_nm;
+    let shown = |i: usize| log.friction_nm[i.min(log.len() - 1)];
+    let bend = |i: usize| shown(i + 1) - 2.0 * shown(i) + shown(i.saturating_sub(1));
+    (0..log.len()).map(|i| unstable[i] && bend(i).abs() > swing).collect()
+}
+
+/// How fast cycles of slip and stick are, but for a factor: the root's way in which the block is wound up is in proportion to the load.
+fn cycle_rate(log: &ContactLog) -> Vec<f64> {
+    log.root_speed_m_s
+        .iter()
+        .zip(&log.load_n)
+        .map(|(v, load)| v.abs() / load.max(f64::MIN_POSITIVE))
+        .collect()
+}
+
+/// Between two places where cycles are too fast, and as fast as at one of them, they are too fast all along as long as slip is unstable:
+/// where their rate is near a multiple of the samples' they are mirrored to what looks slow.
+fn leave_out_between(resolved: &mut [bool], unstable: &[bool], rate: &[f64]) {
+    let mut before: Option<usize> = None;
+    for i in 0..resolved.len() {
+        if !unstable[i] {
+            before = None;
+        } else if !resolved[i] {
+            if let Some(from) = before {
+                let slowest = rate[from].min(rate[i]);
+                (from + 1..i).filter(|at| rate[*at] >= slowest).for_each(|at| resolved[at] = false);
+            }
+            before = Some(i);
+        }
+    }
 }
 
 /// Where cycles of slip and stick are long enough to be told from samples. Faster ones are seen through what smooths the channel,
@@ -417,7 +454,7 @@ fn cycles_resolved(slides: &[bool], swings: &[bool]) -> Vec<bool> {
     let [changes, swings] =
         [so_far(&|i| i > 0 && slides[i] != slides[i - 1]), so_far(&|i| swings.get(i) == Some(&true))];
     let near = |sums: &[usize], i: usize| sums[(i + reach).min(last)] - sums[i.saturating_sub(reach)];
-    // A cycle that is resolved swings in few of its samples.
+    // A cycle that is resolved bends in few of its samples.
     let fast = |i: usize| near(&changes, i) > 4 || near(&swings, i) > reach;
     let fast: Vec<f64> = (0..slides.len()).map(|i| f64::from(u8::from(fast(i)))).collect();
     local_maximum(&fast, reach).into_iter().map(|fast| fast == 0.0).collect()
@@ -499,8 +536,12 @@ mod tests {
     #[test]
     fn a_torque_that_swings_from_sample_to_sample_is_no_slide_where_sliding_is_unstable() {
         const COUNT: usize = 1200;
-        // 40 % at each sample of the middle; noise elsewhere.
-        let swing = |i: usize| if (400..800).contains(&i) { [1.0, 0.2, -1.2][i % 3] } else { 0.0 };
+        // 40 % at each sample of the middle, and what a low-pass leaves of that: three deviations of the noise; noise elsewhere.
+        let swing = |i: usize| match i {
+            400..600 => [1.0, 0.2, -1.2][i % 3],
+            600..800 => [0.03, 0.006, -0.036][i % 3],
+            _ => 0.0,
+        };
         let shown = white(COUNT, 5).iter().enumerate().map(|(i, e)| 2.0 + swing(i) + 0.01 * e).collect();
         let mut log = Log::default();
         log.set_signal(Signal::Time, (0..COUNT).map(|i| 1e-3 * i as f64).collect());
@@ -510,16 +551,28 @@ mod tests {
         let log = ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap();
         let resolved = |damping_n_s_per_m: f64, change: f64| {
             let contact = block(1e4, damping_n_s_per_m, Curve::new(|w| 0.4 + change * (-w / 0.3).exp()));
-            cycles_resolved(&[true; COUNT], &swings(&log, &contact))
+            cycles_resolved(&[true; COUNT], &swings(&log, &unstable(&log, &contact)))
         };
         // 50 N times 1 s/m times e^(−speed/0.3).
         let slope = 50.0 * (-log.root_speed_m_s[COUNT / 2] / 0.3).exp();
         assert!(resolved(2.0 * slope, 0.3).iter().all(|resolved| *resolved));
         // Nor is a slide unstable where friction rises with speed.
         assert!(resolved(0.5 * slope, -0.3).iter().all(|resolved| *resolved));
-        let unstable = resolved(0.5 * slope, 0.3);
-        assert!(unstable[402..798].iter().all(|resolved| !resolved));
-        assert!(unstable[..375].iter().chain(&unstable[825..]).all(|resolved| *resolved));
+        let found = resolved(0.5 * slope, 0.3);
+        assert!(found[402..798].iter().all(|resolved| !resolved));
+        assert!(found[..375].iter().chain(&found[825..]).all(|resolved| *resolved));
+    }
+
+    #[test]
+    fn cycles_that_sampling_mirrors_to_slow_ones_are_too_fast_all_the_same() {
+        let unstable: Vec<bool> = (0..60).map(|i| i != 45).collect();
+        let rate: Vec<f64> = (0..60).map(|i| if (20..25).contains(&i) { 0.5 } else { 1.0 }).collect();
+        let fast = |i: usize| [5..10, 30..40, 50..55].iter().any(|range| range.contains(&i));
+        let mut resolved: Vec<bool> = (0..60).map(|i| !fast(i)).collect();
+        leave_out_between(&mut resolved, &unstable, &rate);
+        // Not where cycles are slower, nor beyond what is stable, nor before the first and behind the last.
+        let out = |i: usize| (5..40).contains(&i) && !(20..25).contains(&i) || (50..55).contains(&i);
+        assert!((0..60).all(|i| resolved[i] != out(i)), "{resolved:?}");
     }
 
     #[test]
