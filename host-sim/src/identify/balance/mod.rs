@@ -64,6 +64,9 @@ pub struct Alternative {
     pub same_amplitude: Vec<Vec<[usize; 2]>>,
     /// Change of the prior means of base parameters.
     pub base_shift: Vec<(usize, f64)>,
+    /// Base parameters that are not negative where this form stands: where they are, the form is so much less likely. Beside others
+    /// they may stand for what nothing explains.
+    pub not_negative: Vec<usize>,
     /// Values of what is not linear.
     pub constants: Vec<(String, f64)>,
     /// ln of the prior probability of this shape among those of the effect.
@@ -96,6 +99,7 @@ impl Alternative {
             disc: None,
             same_amplitude: Vec::new(),
             base_shift: Vec::new(),
+            not_negative: Vec::new(),
             constants: Vec::new(),
             log_prior: 0.0,
             coordinate: None,
@@ -493,6 +497,25 @@ pub(super) mod tests {
         let solved = balance.solve(&[], &[]);
         balance.refit_noise(&solved);
         assert!((balance.deviation[ROWS / 2] - 3.0).abs() < 0.2, "{}", balance.deviation[ROWS / 2]);
+    }
+
+    #[test]
+    fn a_form_may_ask_that_what_stands_beside_it_is_not_negative() {
+        let wave: Vec<f64> = (0..ROWS).map(|i| (0.03 * i as f64).sin()).collect();
+        let gained = |constant: f64| {
+            let response =
+                wave.iter().zip(white(ROWS, 6)).map(|(x, e)| 3.0 * x + constant + 0.1 * e).collect();
+            let balance = beside(response, vec![(Parameter::amplitude("constant", 10.0), vec![1.0; ROWS])]);
+            let place = balance.base.len() - 1;
+            let evidence = |not_negative: Vec<usize>| {
+                let size = vec![Parameter::amplitude("size", 10.0)];
+                let form = Alternative::columns("wave", size, vec![wave.clone()]);
+                balance.solve_forms(&[&Alternative { not_negative, ..form }]).log_evidence
+            };
+            evidence(vec![place]) - evidence(Vec::new())
+        };
+        assert_eq!(gained(2.0), 0.0);
+        assert!(gained(-2.0) < -100.0, "{}", gained(-2.0));
     }
 
     #[test]

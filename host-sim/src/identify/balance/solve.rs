@@ -218,7 +218,12 @@ impl Balance {
         let waves = self.waves(forms, p, covariance);
         let one_amplitude = |scale: f64| waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
         let log_prior: f64 = forms.iter().map(|(form, _)| form.log_prior).sum();
-        log_prior + at.log_evidence(BALANCE_SHARE, one_amplitude)
+        // ln of the share of the posterior that is not negative, but for a factor near one: a bound that is reached would take away
+        // what a free parameter costs.
+        let negative = |place: &usize| p[*place].min(0.0).powi(2) / covariance[(*place, *place)];
+        let not_negative = forms.iter().flat_map(|(form, _)| &form.not_negative);
+        let log_share = -0.5 * BALANCE_SHARE * not_negative.map(negative).sum::<f64>();
+        log_prior + log_share + at.log_evidence(BALANCE_SHARE, one_amplitude)
     }
 
     /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.

@@ -1,10 +1,11 @@
 //! `bearing_stribeck`: the bearing's friction falls with speed near zero.
 //!
-//! However it falls: a sum of Gaussians that are not negative, `stribeck_curve.rs`.
+//! However it falls: a sum of Gaussians that are not negative, `stribeck_curve.rs`, beside Coulomb friction that is not so either.
 
 use super::stribeck_curve::Curve;
 use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
+use crate::identify::drive::COULOMB;
 
 /// The effect.
 pub(super) struct BearingStribeck;
@@ -22,6 +23,8 @@ impl Effect for BearingStribeck {
         let curve = Curve::new(view);
         vec![Alternative {
             constants: curve.constants(),
+            // What falls over all speeds down to less than no friction is a drag that rises with them.
+            not_negative: vec![COULOMB],
             ..Alternative::columns(self.id(), curve.parameters("", view.scales.own), curve.columns(view, |d| d))
         }]
     }

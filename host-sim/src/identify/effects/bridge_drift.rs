@@ -15,6 +15,8 @@ pub(super) struct BridgeDrift;
 const BENDS: [f64; 3] = [0.1, 0.3, 10.0];
 /// Half periods in the longest log up to which a drift's wandering is told: what changes faster is none.
 const WANDERING: usize = 4;
+/// Forms of a drift: it settles, it wanders alike in each log, it wanders in each log by itself.
+const FORMS: f64 = 3.0;
 
 /// Share of all of it by which a gain drifts, deviation of the prior, where a zero may drift by all: a foil's factor by a percent in
 /// 100 K, an amplifier's by less; a tenth is a bridge that is coming loose.
@@ -78,6 +80,36 @@ impl Course {
             let parts = 0..self.parts().len();
             parts.map(|part| column(&|time: &[f64]| self.part(part, time), gain)).collect()
         })
+    }
+}
+
+/// A zero that wanders in each log by itself, from wherever it stands when the log begins: a random walk is another one each time.
+struct OwnWalk;
+
+impl OwnWalk {
+    /// Names and largest values of its parts in one log.
+    fn parts() -> Vec<(String, f64)> {
+        std::iter::once(("begin".to_string(), 1.0)).chain(Course::Wanders.parts()).collect()
+    }
+
+    /// Part number `part` over time.
+    fn part(part: usize, time: &[f64]) -> Vec<f64> {
+        part.checked_sub(1).map_or_else(|| vec![1.0; time.len()], |part| Course::Wanders.part(part, time))
+    }
+
+    /// The parameters of all parts in so many logs.
+    fn parameters(zero: &str, logs: usize, size: f64) -> Vec<Parameter> {
+        let of_log = |log: usize| {
+            let named = move |(name, share)| Parameter::amplitude(format!("{zero}_{name}_log{}", log + 1), share * size);
+            Self::parts().into_iter().map(named)
+        };
+        (0..logs).flat_map(of_log).collect()
+    }
+
+    /// The columns of all parts in so many logs: `column` makes one of a log's place and of what a part does there over time.
+    fn columns<C>(logs: usize, column: impl Fn(usize, &dyn Fn(&[f64]) -> Vec<f64>) -> C) -> Vec<C> {
+        let pairs = (0..logs).flat_map(|log| (0..Self::parts().len()).map(move |part| (log, part)));
+        pairs.map(|(log, part)| column(log, &|time: &[f64]| Self::part(part, time))).collect()
     }
 }
 
@@ -145,16 +177,15 @@ impl Effect for BridgeDrift {
             };
             view.coordinates.iter().enumerate().map(column).collect()
         };
+        let load_share = |at: usize, i: usize| s.load_n / view.logs[at].load_n[i].max(0.06 * s.load_n);
         let of_course = |course: Course| {
             let friction = course.columns(|part, gain| {
                 let size = if gain { 1.0 } else { s.torque_nm };
                 over_time(part, &|_, _| size)
             });
             // An error of the load is a factor of friction the other way.
-            let normal = course.columns(|part, gain| {
-                let load = |at: usize, i: usize| s.load_n / view.logs[at].load_n[i].max(0.06 * s.load_n);
-                over_time(part, &|at, i| if gain { 1.0 } else { load(at, i) })
-            });
+            let normal =
+                course.columns(|part, gain| over_time(part, &|at, i| if gain { 1.0 } else { load_share(at, i) }));
             let named = |bridge: &str| course.parameters(bridge, ["zero", "gain"], 1.0);
             [
                 ContactTerm::amplifier(self.id(), course.form(["friction", "friction wanders"]), friction, named("friction"))
@@ -165,7 +196,26 @@ impl Effect for BridgeDrift {
                     .exported(move |p, _| export(course, p, "normal", s_time, s_load)),
             ]
         };
-        Course::ALL.into_iter().flat_map(of_course).collect()
+        let of_log = |only: usize, part: &dyn Fn(&[f64]) -> Vec<f64>, of: &dyn Fn(usize, usize) -> f64| -> Column {
+            let knows = |at: usize| view.training && at == only;
+            let mut column = over_time(part, of);
+            let others = column.iter_mut().enumerate().filter(|(at, _)| !knows(*at));
+            others.for_each(|(_, values)| values.fill(0.0));
+            column
+        };
+        let forms = Course::ALL.into_iter().flat_map(of_course);
+        if view.train_count < 2 {
+            return forms.collect();
+        }
+        let walk = |bridge: &str| OwnWalk::parameters(&format!("{bridge}_zero"), view.train_count, 1.0);
+        let friction = OwnWalk::columns(view.train_count, |log, part| of_log(log, part, &|_, _| s.torque_nm));
+        let normal = OwnWalk::columns(view.train_count, |log, part| of_log(log, part, &load_share));
+        let apart = [
+            ContactTerm::amplifier(self.id(), "friction wanders in each log", [friction, Vec::new()], walk("friction"))
+                .as_error_of(Bridge::Friction),
+            ContactTerm::factor(self.id(), "normal wanders in each log", normal, walk("normal")).as_error_of(Bridge::Normal),
+        ];
+        forms.chain(apart).collect()
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
@@ -181,7 +231,7 @@ impl Effect for BridgeDrift {
                 let drift: Vec<f64> = course(&time).iter().enumerate().map(|(i, d)| d * size(i)).collect();
                 log.filtered(&drift)
             };
-            view.logs.iter().flat_map(of).collect::<Vec<f64>>()
+            view.logs.iter().map(of).collect::<Vec<_>>()
         };
         self.alternatives("friction", s.effort, over_time)
     }
@@ -194,29 +244,41 @@ impl Effect for BridgeDrift {
                 let load = |i: usize| if with_load { log.filtered_n[i] / s.load_n } else { 1.0 };
                 course(&time).iter().enumerate().map(|(i, d)| -d * load(i)).collect::<Vec<f64>>()
             };
-            view.logs.iter().flat_map(of).collect::<Vec<f64>>()
+            view.logs.iter().map(of).collect::<Vec<_>>()
         };
         self.alternatives("normal", s.torque_nm, over_time)
     }
 }
 
 impl BridgeDrift {
-    /// Each course as a form of a balance that is linear in its parts.
+    /// Each course as a form of a balance that is linear in its parts; `over_time` makes of a part what it does in each log.
     fn alternatives(
         &self,
         bridge: &str,
         size_nm: f64,
-        over_time: impl Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> Vec<f64>,
+        over_time: impl Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> Column,
     ) -> Vec<Alternative> {
+        let alternative = |form: String, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>| Alternative {
+            form: format!("{bridge}, {form}"),
+            log_prior: -FORMS.ln(),
+            ..Alternative::columns(self.id(), parameters, columns)
+        };
         let of_course = |course: Course| {
             let parameters = course.parameters(bridge, ["zero_nm", "gain_nm"], size_nm);
-            Alternative {
-                form: format!("{bridge}, {}", course.form(["settling", "wandering"])),
-                log_prior: -(Course::ALL.len() as f64).ln(),
-                ..Alternative::columns(self.id(), parameters, course.columns(&over_time).concat())
-            }
+            let columns = course.columns(|part, gain| over_time(part, gain).concat()).concat();
+            alternative(course.form(["settling", "wandering"]).to_string(), parameters, columns)
         };
-        Course::ALL.into_iter().map(of_course).collect()
+        let logs = over_time(&|time: &[f64]| vec![1.0; time.len()], false).len();
+        let of_log = |log: usize, part: &dyn Fn(&[f64]) -> Vec<f64>| {
+            let mut column = over_time(part, false);
+            column.iter_mut().enumerate().filter(|(at, _)| *at != log).for_each(|(_, values)| values.fill(0.0));
+            column.concat()
+        };
+        let apart = (logs > 1).then(|| {
+            let parameters = OwnWalk::parameters(&format!("{bridge}_zero_nm"), logs, size_nm);
+            alternative("wandering in each log".to_string(), parameters, OwnWalk::columns(logs, of_log))
+        });
+        Course::ALL.into_iter().map(of_course).chain(apart).collect()
     }
 }
 
@@ -250,6 +312,18 @@ mod tests {
         let turns_back = |t: f64| (1.5 * TAU * t + 0.7).sin() - 0.7f64.sin();
         let [settling, wandering] = Course::ALL.map(|course| left(course, &turns_back));
         assert!(wandering < 0.05 && settling > 0.3, "{settling} {wandering}");
+    }
+
+    #[test]
+    fn a_walk_of_each_log_has_columns_of_its_own() {
+        let time = [vec![0.0, 0.5, 1.0], vec![0.0, 0.25]];
+        let columns = OwnWalk::columns(2, |log, part| (log, part(&time[log])));
+        let parameters = OwnWalk::parameters("friction_zero_nm", 2, 3.0);
+        assert_eq!((columns.len(), parameters.len()), (12, 12));
+        assert_eq!((&columns[0], &columns[7]), (&(0, vec![1.0; 3]), &(1, time[1].clone())));
+        assert_eq!(parameters[7].name, "friction_zero_nm_steady_log2");
+        // A sine stands for no more than the walk's way back.
+        assert_eq!((parameters[7].sd, parameters[8].sd < 2.0), (3.0, true));
     }
 
     #[test]
