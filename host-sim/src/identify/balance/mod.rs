@@ -64,8 +64,7 @@ pub struct Alternative {
     pub same_amplitude: Vec<Vec<[usize; 2]>>,
     /// Change of the prior means of base parameters.
     pub base_shift: Vec<(usize, f64)>,
-    /// Base parameters that are not negative where this form stands: where they are, the form is so much less likely. Beside others
-    /// they may stand for what nothing explains.
+    /// Base parameters that are not negative where this form stands; beside others they may be so for what nothing explains.
     pub not_negative: Vec<usize>,
     /// Values of what is not linear.
     pub constants: Vec<(String, f64)>,
@@ -508,9 +507,12 @@ pub(super) mod tests {
             let balance = beside(response, vec![(Parameter::amplitude("constant", 10.0), vec![1.0; ROWS])]);
             let place = balance.base.len() - 1;
             let evidence = |not_negative: Vec<usize>| {
+                let is_bounded = !not_negative.is_empty();
                 let size = vec![Parameter::amplitude("size", 10.0)];
                 let form = Alternative::columns("wave", size, vec![wave.clone()]);
-                balance.solve_forms(&[&Alternative { not_negative, ..form }]).log_evidence
+                let solved = balance.solve_forms(&[&Alternative { not_negative, ..form }]);
+                assert!((solved.p[place] < 0.0) == (constant < 0.0 && !is_bounded), "{:?}", solved.p);
+                solved.log_evidence
             };
             evidence(vec![place]) - evidence(Vec::new())
         };

@@ -159,6 +159,9 @@ impl Balance {
             for (place, shift) in &form.base_shift {
                 parameters[*place].mean += shift;
             }
+            for place in &form.not_negative {
+                parameters[*place].lower = 0.0;
+            }
         }
         parameters.extend(forms.iter().flat_map(|(form, _)| form.parameters.iter().cloned()));
         let x: Vec<&[f64]> = self
@@ -218,12 +221,15 @@ impl Balance {
         let waves = self.waves(forms, p, covariance);
         let one_amplitude = |scale: f64| waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
         let log_prior: f64 = forms.iter().map(|(form, _)| form.log_prior).sum();
-        // ln of the share of the posterior that is not negative, but for a factor near one: a bound that is reached would take away
-        // what a free parameter costs.
-        let negative = |place: &usize| p[*place].min(0.0).powi(2) / covariance[(*place, *place)];
-        let not_negative = forms.iter().flat_map(|(form, _)| &form.not_negative);
-        let log_share = -0.5 * BALANCE_SHARE * not_negative.map(negative).sum::<f64>();
-        log_prior + log_share + at.log_evidence(BALANCE_SHARE, one_amplitude)
+        // A bound that is reached takes nothing from what its parameter costs.
+        let reached = |place: &&usize| p[**place] <= 0.0;
+        let cost = |place: &usize| {
+            let told = curvature[(*place, *place)] * parameters[*place].sd.powi(2);
+            0.5 * (1.0 + BALANCE_SHARE * told).ln()
+        };
+        let bounds = forms.iter().flat_map(|(form, _)| &form.not_negative).filter(reached);
+        let bounded: f64 = bounds.map(cost).sum();
+        log_prior - bounded + at.log_evidence(BALANCE_SHARE, one_amplitude)
     }
 
     /// Waves of one amplitude in all logs, as each log sees them, with the deviation of their prior.

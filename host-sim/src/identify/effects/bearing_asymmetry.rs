@@ -6,6 +6,7 @@
 use super::stribeck_curve::{Curve, turns_both_ways};
 use super::{About, DriveLaw, DriveView, Effect};
 use crate::identify::balance::Alternative;
+use crate::identify::drive::COULOMB;
 use crate::identify::term::Parameter;
 
 /// The effect.
@@ -53,6 +54,7 @@ impl Effect for BearingAsymmetry {
         let one_way = |(way, acts): (&str, _)| Alternative {
             form: format!("a Stribeck curve {}", &way[1..]),
             constants: curve.constants(),
+            not_negative: vec![COULOMB],
             log_prior: -4f64.ln(),
             ..Alternative::columns(
                 self.id(),
