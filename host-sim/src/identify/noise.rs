@@ -12,7 +12,7 @@ use super::spectrum::Spectrum;
 pub const WINDOW: usize = 48;
 /// Share of windows taken as quiet, with its normal deviate.
 const QUIET: (f64, f64) = (0.25, -0.6745);
-/// Share of a bridge's windows that is quiet where a tip slips and sticks in most of them.
+/// The same where a tip slips and sticks in most of them.
 const QUIETEST: (f64, f64) = (0.1, -1.2816);
 /// By noise alone the two shares tell of deviations that are a few hundredths apart in records of some seconds.
 const ALIKE: f64 = 1.25;
@@ -26,13 +26,16 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
 /// As [`standard_deviation`] for a bridge. Where it stands at the largest or the smallest value of its record it may be at an end of
 /// its range, which cuts its noise too: a window that it holds for a quarter says nothing. An encoder that rests is quiet.
 pub fn bridge_deviation(values: &[f64]) -> f64 {
+    of_bridge(values, QUIET)
+}
+
+/// The same from this share of the windows.
+fn of_bridge(values: &[f64], quiet: (f64, f64)) -> f64 {
     let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
     let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let at_end = |x: &&f64| **x == lowest || **x == highest;
     let is_free = |window: &[f64]| 4 * window.iter().filter(at_end).count() < WINDOW;
-    let [usual, least] = [QUIET, QUIETEST].map(|quiet| quiet_deviation(values, quiet, is_free));
-    let quiet = if usual < ALIKE * least { usual } else { least };
-    quiet.max(resolution(values))
+    quiet_deviation(values, quiet, is_free).max(resolution(values))
 }
 
 /// Deviation of what a channel's smallest step rounds.
@@ -42,11 +45,12 @@ fn resolution(values: &[f64]) -> f64 {
     if smallest < f64::MAX { smallest / 12f64.sqrt() } else { 0.0 }
 }
 
-/// As [`bridge_deviation`] for a channel whose noise is white, so that a signal that swings in every window does not count
-/// as noise: from the quietest part of its spectrum.
+/// As [`bridge_deviation`] for the friction torque, which swings wherever a tip slips and sticks: from the quietest windows where most
+/// of them swing, and as its noise is white, from the quietest part of its spectrum where all of them do.
 pub fn white_deviation(values: &[f64]) -> f64 {
-    let usual = bridge_deviation(values);
-    Spectrum::new(values).map_or(usual, |spectrum| spectrum.white_deviation().min(usual))
+    let [usual, least] = [QUIET, QUIETEST].map(|quiet| of_bridge(values, quiet));
+    let quiet = if usual < ALIKE * least { usual } else { least };
+    Spectrum::new(values).map_or(quiet, |spectrum| spectrum.white_deviation().min(quiet))
 }
 
 /// As [`white_deviation`] by fourth differences, for a drive's own channels: their noise is not white, and the quietest part of
@@ -248,15 +252,16 @@ pub(in crate::identify) mod tests {
     }
 
     #[test]
-    fn a_bridge_is_as_noisy_as_where_it_rests_if_it_swings_elsewhere() {
+    fn a_torque_is_as_noisy_as_where_it_rests_if_it_swings_elsewhere() {
         let noise = white(20_000, 9);
         let swing = |i: usize| if i % 5000 < 4200 { (0.9 * i as f64).sin() } else { 0.0 };
         let values: Vec<f64> = noise.iter().enumerate().map(|(i, e)| swing(i) + 0.01 * e).collect();
         // Six tenths of the windows that are quiet are quieter than the one that tells.
-        let found = bridge_deviation(&values);
+        let found = white_deviation(&values);
         assert!((1.0..1.25).contains(&(found / 0.01)), "{found}");
+        assert!(bridge_deviation(&values) > 0.1);
         // Where it is as noisy everywhere, the usual windows tell.
-        assert_eq!(bridge_deviation(&noise), standard_deviation(&noise));
+        assert!(white_deviation(&noise) <= standard_deviation(&noise));
     }
 
     #[test]
