@@ -233,7 +233,9 @@ impl Effect for BridgeDrift {
             };
             view.logs.iter().map(of).collect::<Vec<_>>()
         };
-        self.alternatives("friction", s.effort, over_time)
+        let mut forms = self.alternatives("friction", s.effort, &over_time);
+        forms.extend(self.own_walk("friction", s.effort, view.logs.len(), &over_time));
+        forms
     }
 
     fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
@@ -246,39 +248,54 @@ impl Effect for BridgeDrift {
             };
             view.logs.iter().map(of).collect::<Vec<_>>()
         };
-        self.alternatives("normal", s.torque_nm, over_time)
+        // A walk of each log would take up what the lever's friction leaves.
+        self.alternatives("normal", s.torque_nm, &over_time)
     }
 }
 
+/// What a part of a drift over time does in the rows of each log, as a zero or as a gain.
+type OverTime<'a> = &'a dyn Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> Column;
+
 impl BridgeDrift {
-    /// Each course as a form of a balance that is linear in its parts; `over_time` makes of a part what it does in each log.
+    /// A form of a balance that is linear in its parts.
+    fn alternative(&self, form: String, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>) -> Alternative {
+        Alternative { form, log_prior: -FORMS.ln(), ..Alternative::columns(self.id(), parameters, columns) }
+    }
+
+    /// Each course as a form; `over_time` makes of a part what it does in each log.
     fn alternatives(
         &self,
         bridge: &str,
         size_nm: f64,
-        over_time: impl Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> Column,
+        over_time: OverTime<'_>,
     ) -> Vec<Alternative> {
-        let alternative = |form: String, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>| Alternative {
-            form: format!("{bridge}, {form}"),
-            log_prior: -FORMS.ln(),
-            ..Alternative::columns(self.id(), parameters, columns)
-        };
         let of_course = |course: Course| {
             let parameters = course.parameters(bridge, ["zero_nm", "gain_nm"], size_nm);
             let columns = course.columns(|part, gain| over_time(part, gain).concat()).concat();
-            alternative(course.form(["settling", "wandering"]).to_string(), parameters, columns)
+            let form = format!("{bridge}, {}", course.form(["settling", "wandering"]));
+            self.alternative(form, parameters, columns)
         };
-        let logs = over_time(&|time: &[f64]| vec![1.0; time.len()], false).len();
+        Course::ALL.into_iter().map(of_course).collect()
+    }
+
+    /// A zero that walks in each of some logs by itself; in one log it is the course that wanders.
+    fn own_walk(
+        &self,
+        bridge: &str,
+        size_nm: f64,
+        logs: usize,
+        over_time: OverTime<'_>,
+    ) -> Option<Alternative> {
         let of_log = |log: usize, part: &dyn Fn(&[f64]) -> Vec<f64>| {
             let mut column = over_time(part, false);
             column.iter_mut().enumerate().filter(|(at, _)| *at != log).for_each(|(_, values)| values.fill(0.0));
             column.concat()
         };
-        let apart = (logs > 1).then(|| {
+        (logs > 1).then(|| {
             let parameters = OwnWalk::parameters(&format!("{bridge}_zero_nm"), logs, size_nm);
-            alternative("wandering in each log".to_string(), parameters, OwnWalk::columns(logs, of_log))
-        });
-        Course::ALL.into_iter().map(of_course).chain(apart).collect()
+            let form = format!("{bridge}, wandering in each log");
+            self.alternative(form, parameters, OwnWalk::columns(logs, of_log))
+        })
     }
 }
 
