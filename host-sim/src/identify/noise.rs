@@ -253,8 +253,9 @@ pub(in crate::identify) mod tests {
 
     #[test]
     fn a_torque_is_as_noisy_as_where_it_rests_if_it_swings_elsewhere() {
-        let noise = white(20_000, 9);
-        let swing = |i: usize| if i % 5000 < 4200 { (0.9 * i as f64).sin() } else { 0.0 };
+        let [noise, chatter] = [9, 10].map(|seed| white(20_000, seed));
+        // Of cycles faster than samples nothing in the spectrum is quiet.
+        let swing = |i: usize| if i % 5000 < 4200 { 0.5 * chatter[i] } else { 0.0 };
         let values: Vec<f64> = noise.iter().enumerate().map(|(i, e)| swing(i) + 0.01 * e).collect();
         // Six tenths of the windows that are quiet are quieter than the one that tells.
         let found = white_deviation(&values);

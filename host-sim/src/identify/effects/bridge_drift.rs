@@ -15,8 +15,6 @@ pub(super) struct BridgeDrift;
 const BENDS: [f64; 3] = [0.1, 0.3, 10.0];
 /// Half periods in the longest log up to which a drift's wandering is told: what changes faster is none.
 const WANDERING: usize = 4;
-/// Forms of a drift: it settles, it wanders alike in each log, it wanders in each log by itself.
-const FORMS: f64 = 3.0;
 
 /// Share of all of it by which a gain drifts, deviation of the prior, where a zero may drift by all: a foil's factor by a percent in
 /// 100 K, an amplifier's by less; a tenth is a bridge that is coming loose.
@@ -113,6 +111,13 @@ impl OwnWalk {
     }
 }
 
+/// A column in one log alone, or in none.
+fn in_log_alone(mut column: Column, log: Option<usize>) -> Column {
+    let others = column.iter_mut().enumerate().filter(|(at, _)| Some(*at) != log);
+    others.for_each(|(_, values)| values.fill(0.0));
+    column
+}
+
 /// The core's drift, which has one settling time: least squares on the sum of the columns over the log.
 fn export(course: Course, p: &[f64], bridge: &str, time_s: f64, zero: f64) -> Vec<(String, f64)> {
     const POINTS: usize = 100;
@@ -197,11 +202,8 @@ impl Effect for BridgeDrift {
             ]
         };
         let of_log = |only: usize, part: &dyn Fn(&[f64]) -> Vec<f64>, of: &dyn Fn(usize, usize) -> f64| -> Column {
-            let knows = |at: usize| view.training && at == only;
-            let mut column = over_time(part, of);
-            let others = column.iter_mut().enumerate().filter(|(at, _)| !knows(*at));
-            others.for_each(|(_, values)| values.fill(0.0));
-            column
+            // Of another log than those of the training nothing is known.
+            in_log_alone(over_time(part, of), view.training.then_some(only))
         };
         let forms = Course::ALL.into_iter().flat_map(of_course);
         if view.train_count < 2 {
@@ -257,9 +259,9 @@ impl Effect for BridgeDrift {
 type OverTime<'a> = &'a dyn Fn(&dyn Fn(&[f64]) -> Vec<f64>, bool) -> Column;
 
 impl BridgeDrift {
-    /// A form of a balance that is linear in its parts.
+    /// A form of a balance that is linear in its parts: one of the courses, or the walk of each log.
     fn alternative(&self, form: String, parameters: Vec<Parameter>, columns: Vec<Vec<f64>>) -> Alternative {
-        Alternative { form, log_prior: -FORMS.ln(), ..Alternative::columns(self.id(), parameters, columns) }
+        Alternative { form, log_prior: -((Course::ALL.len() + 1) as f64).ln(), ..Alternative::columns(self.id(), parameters, columns) }
     }
 
     /// Each course as a form; `over_time` makes of a part what it does in each log.
@@ -287,9 +289,7 @@ impl BridgeDrift {
         over_time: OverTime<'_>,
     ) -> Option<Alternative> {
         let of_log = |log: usize, part: &dyn Fn(&[f64]) -> Vec<f64>| {
-            let mut column = over_time(part, false);
-            column.iter_mut().enumerate().filter(|(at, _)| *at != log).for_each(|(_, values)| values.fill(0.0));
-            column.concat()
+            in_log_alone(over_time(part, false), Some(log)).concat()
         };
         (logs > 1).then(|| {
             let parameters = OwnWalk::parameters(&format!("{bridge}_zero_nm"), logs, size_nm);

@@ -172,13 +172,11 @@ impl<'a> Joint<'a> {
     /// two that are tried, and not below the lowest of those.
     pub fn sharpened(&self, orders: &[f64], candidates: &Candidates) -> Vec<f64> {
         let of_wave = 2 * self.stretches.len();
-        let (columns_of, solved) =
-            (|orders: &[f64]| self.columns_of(orders), |columns: &[Vec<f64>]| self.solved(columns));
         let (within, lowest) =
             (0.5 * candidates.step(), candidates.wave_numbers.first().copied().unwrap_or(0.0));
         let mut best = orders.to_vec();
-        let mut columns = columns_of(&best);
-        let (mut explained, mut p) = solved(&columns);
+        let mut columns = self.columns_of(&best);
+        let (mut explained, mut p) = self.solved(&columns);
         for _ in 0..STEPS {
             let moves: Vec<Vec<f64>> = best
                 .iter()
@@ -197,7 +195,7 @@ impl<'a> Joint<'a> {
                 .collect();
             let count = columns.len();
             columns.extend(moves);
-            let (_, with_moves) = solved(&columns);
+            let (_, with_moves) = self.solved(&columns);
             let next: Vec<f64> = best
                 .iter()
                 .zip(orders)
@@ -206,8 +204,8 @@ impl<'a> Joint<'a> {
                     (k + with_moves[count + at]).min(from + within).max(from - within).max(lowest)
                 })
                 .collect();
-            columns = columns_of(&next);
-            let (by_next, of_next) = solved(&columns);
+            columns = self.columns_of(&next);
+            let (by_next, of_next) = self.solved(&columns);
             if by_next <= explained {
                 break;
             }

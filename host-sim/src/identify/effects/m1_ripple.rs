@@ -32,6 +32,7 @@ impl Effect for M1Ripple {
     fn normal_load(&self, view: &NormalLoadView<'_>) -> Vec<Alternative> {
         let angle: Option<Vec<&[f64]>> = view.logs.iter().map(|log| log.angle_rad.as_deref()).collect();
         let force: Vec<&[f64]> = view.logs.iter().map(|log| log.filtered_n.as_slice()).collect();
+        let torque = waves::travel(view.logs.iter().flat_map(|log| log.smoothed_torque_nm.iter().copied()));
         let mut all = Vec::new();
         for (over, positions) in [("angle", angle), ("force", Some(force))] {
             let Some(positions) = positions else { continue };
@@ -60,7 +61,6 @@ impl Effect for M1Ripple {
             let joints =
                 [false, true].map(|own| (own, Joint::new(view.balance, &position, view.company, own)));
             // Where a wave of the torque is steeper than the springs, no position holds: the mechanism jumps from well to well.
-            let torque = waves::travel(view.logs.iter().flat_map(|log| log.smoothed_torque_nm.iter().copied()));
             let springs = torque / travel.max(f64::MIN_POSITIVE);
             for (apart, searched) in &joints {
                 let orders = searched.orders(&candidates, MOST_ORDERS);
