@@ -86,13 +86,13 @@ mod tests {
     use super::super::bearing_stribeck::BearingStribeck;
     use super::super::torque_offset::TorqueOffset;
     use super::*;
-    use crate::identify::balance::Company;
+    use crate::identify::balance::{Company, Solved};
     use crate::identify::drive::{self, DriveLog, DrivePrior, DriveScales};
     use crate::identify::grid::Grid;
     use crate::identify::noise::tests::white;
 
-    /// Log evidence that each effect's best form gains where the bearing adds `drag` of the speed.
-    fn gains(drag: impl Fn(f64) -> f64) -> [f64; 3] {
+    /// What is made of a drive whose bearing adds `drag` of the speed, and of what its base leaves.
+    fn of_drag<T>(drag: impl Fn(f64) -> f64, make: impl FnOnce(&DriveView<'_>, &Solved) -> T) -> T {
         let time: Vec<f64> = (0..20_000).map(|i| 1e-3 * f64::from(i)).collect();
         let position: Vec<f64> = time.iter().map(|t| -8.0 * (0.7 * t).cos() - (3.1 * t).cos()).collect();
         let noise = white(time.len(), 3);
@@ -117,11 +117,34 @@ mod tests {
             fixed: None,
             bearing: None,
         };
+        make(&view, &none)
+    }
+
+    /// Log evidence that each effect's best form gains there.
+    fn gains(drag: impl Fn(f64) -> f64) -> [f64; 3] {
         let effects: [&dyn Effect; 3] = [&BearingStribeck, &BearingAsymmetry, &TorqueOffset];
-        effects.map(|effect| {
-            let evidence = |form: Alternative| balance.solve_forms(&[&form]).log_evidence;
-            effect.drive(&view).into_iter().map(evidence).fold(f64::NEG_INFINITY, f64::max) - none.log_evidence
+        of_drag(drag, |view, none| {
+            effects.map(|effect| {
+                let evidence = |form: Alternative| view.balance.solve_forms(&[&form]).log_evidence;
+                effect.drive(view).into_iter().map(evidence).fold(f64::NEG_INFINITY, f64::max) - none.log_evidence
+            })
         })
+    }
+
+    /// A fan's drag over all speeds, beside which a curve that falls would need a Coulomb friction that drives.
+    #[test]
+    fn a_curve_that_falls_stands_beside_coulomb_friction_that_brakes() {
+        let least = |effect: &dyn Effect| {
+            of_drag(
+                |v| 0.01 * v * v.abs(),
+                |view, _| {
+                    let curves = effect.drive(view).into_iter().filter(|form| form.parameters.len() > 2);
+                    let coulomb = |form: Alternative| view.balance.solve_forms(&[&form]).p[COULOMB];
+                    curves.map(coulomb).fold(f64::INFINITY, f64::min)
+                },
+            )
+        };
+        assert_eq!([least(&BearingStribeck), least(&BearingAsymmetry)], [0.0, 0.0]);
     }
 
     #[test]

@@ -339,6 +339,9 @@ mod tests {
         assert_eq!((columns.len(), parameters.len()), (12, 12));
         assert_eq!((&columns[0], &columns[7]), (&(0, vec![1.0; 3]), &(1, time[1].clone())));
         assert_eq!(parameters[7].name, "friction_zero_nm_steady_log2");
+        let column = vec![vec![1.0], vec![2.0, 3.0]];
+        assert_eq!(in_log_alone(column.clone(), Some(1)), [vec![0.0], vec![2.0, 3.0]]);
+        assert_eq!(in_log_alone(column, None), [vec![0.0], vec![0.0; 2]]);
         // A sine stands for no more than the walk's way back.
         assert_eq!((parameters[7].sd, parameters[8].sd < 2.0), (3.0, true));
     }

@@ -92,7 +92,7 @@ mod tests {
     use crate::identify::normal_load::{NormalLoadLog, NormalLoadScales, balance};
 
     /// Slow ramps of the torque, on which a wave over M1's angle rides.
-    fn log(rig: &RigFile, order: f64, phase: f64, seed: u64) -> Log {
+    fn log(rig: &RigFile, [order, phase, size_nm]: [f64; 3], seed: u64) -> Log {
         const COUNT: usize = 8000;
         let swing = |i: usize| 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / 4000.0).cos();
         let angle = |i: usize| 0.05 * swing(i);
@@ -104,22 +104,22 @@ mod tests {
         log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
         log.set_signal(Signal::M1Torque, series(&|i| carried(i) + 0.005 * noise[0][i]));
         log.set_signal(Signal::M1Angle, series(&angle));
-        // The setpoint does not know of the ripple, the force shows it. It is as steep as three quarters of the springs, 40 N m/rad:
-        // a steeper one would hold the mechanism.
-        let made = |i: usize| carried(i) + 0.05 * (order * angle(i) + phase).sin();
+        // The setpoint does not know of the ripple, the force shows it.
+        let made = |i: usize| carried(i) + size_nm * (order * angle(i) + phase).sin();
         let force = |i: usize| rig.lever_gain_n_per_nm * made(i) - rig.preload_n;
         log.set_signal(Signal::NormalForce, series(&|i| force(i) + 0.25 * noise[1][i]));
         log.set_signal(Signal::FrictionTorque, vec![2.0; COUNT]);
         log
     }
 
-    #[test]
-    fn an_order_that_only_logs_apart_show_is_tried_in_one_phase_too() {
+    const ORDER: f64 = 600.0;
+
+    /// What is made of the effect's forms in two logs in which a ripple of this size has opposite phases: in one phase they show
+    /// nothing at its order.
+    fn of_forms<T>(size_nm: f64, make: impl FnOnce(Vec<Alternative>, &NormalLoadView<'_>) -> T) -> T {
         let rig = RigFile::assumed_rig(&[]).unwrap();
-        // Opposite phases: in one phase the two logs show nothing at this order.
-        let order = 600.0;
         let logs = [(0.3, 1), (0.3 + std::f64::consts::PI, 3)].map(|(phase, seed)| {
-            let contact = ContactLog::new(&log(&rig, order, phase, seed), &rig).unwrap();
+            let contact = ContactLog::new(&log(&rig, [ORDER, phase, size_nm], seed), &rig).unwrap();
             NormalLoadLog::new(&contact, &rig).unwrap()
         });
         let scales = NormalLoadScales::new(&logs);
@@ -127,16 +127,33 @@ mod tests {
         let residual = balance.solve(&[], &[]).residual;
         let company = Company { forms: &[], residual: &residual };
         let view = NormalLoadView { logs: &logs, scales: &scales, balance: &balance, company, fixed: None };
-        let forms = M1Ripple.normal_load(&view);
+        make(M1Ripple.normal_load(&view), &view)
+    }
+
+    fn is_of_order(form: &&Alternative) -> bool {
         let half_step = 0.25 * std::f64::consts::TAU / 0.05;
-        let first_is = |form: &&Alternative| {
-            let (name, value) = &form.constants[0];
-            name == "order_1" && (value - order).abs() < half_step
-        };
-        let of_order: Vec<&Alternative> = forms.iter().filter(first_is).collect();
-        assert!(of_order.iter().any(|form| !form.is_of_each_log()), "in one phase");
-        let solved = of_order.iter().find(|form| form.is_of_each_log()).expect("in a phase for each log");
-        let left = balance.rms(&balance.solve_forms(&[solved]).residual) / balance.rms(&residual);
-        assert!(left < 0.1, "{left}");
+        let (name, value) = &form.constants[0];
+        name == "order_1" && (value - ORDER).abs() < half_step
+    }
+
+    #[test]
+    fn an_order_that_only_logs_apart_show_is_tried_in_one_phase_too() {
+        // As steep as three quarters of the springs, 40 N m/rad.
+        of_forms(0.05, |forms, view| {
+            let of_order: Vec<&Alternative> = forms.iter().filter(is_of_order).collect();
+            assert!(of_order.iter().any(|form| !form.is_of_each_log()), "in one phase");
+            let solved = of_order.iter().find(|form| form.is_of_each_log()).expect("in a phase for each log");
+            let left =
+                view.balance.rms(&view.balance.solve_forms(&[solved]).residual) / view.balance.rms(view.company.residual);
+            assert!(left < 0.1, "{left}");
+        });
+    }
+
+    #[test]
+    fn a_wave_that_is_steeper_than_the_springs_is_no_ripple() {
+        of_forms(0.2, |forms, _| {
+            let apart = forms.iter().filter(is_of_order).filter(|form| form.is_of_each_log());
+            assert_eq!(apart.count(), 0);
+        });
     }
 }
