@@ -121,6 +121,16 @@ pub fn normal_equations<C: AsRef<[f64]> + Sync>(
     w: &[f64],
     r: &[f64],
 ) -> (DMatrix<f64>, DVector<f64>) {
+    normal_equations_of(j, w, r, |_, _| true)
+}
+
+/// The same with the products of these pairs of columns alone, the later column first; those of others are zero.
+pub fn normal_equations_of<C: AsRef<[f64]> + Sync>(
+    j: &[C],
+    w: &[f64],
+    r: &[f64],
+    wanted: impl Fn(usize, usize) -> bool + Sync,
+) -> (DMatrix<f64>, DVector<f64>) {
     let n = j.len();
     let tasks: Vec<(DMatrix<f64>, DVector<f64>)> = (0..r.len().div_ceil(ROWS_OF_A_TASK))
         .into_par_iter()
@@ -134,7 +144,7 @@ pub fn normal_equations<C: AsRef<[f64]> + Sync>(
                     let weighted = &mut weighted[..rows.len()];
                     let pairs = j[a].as_ref()[rows.clone()].iter().zip(&w[rows.clone()]);
                     weighted.iter_mut().zip(pairs).for_each(|(out, (x, w))| *out = x * w);
-                    for b in 0..=a {
+                    for b in (0..=a).filter(|b| wanted(a, *b)) {
                         h[(a, b)] += dot(weighted, &j[b].as_ref()[rows.clone()]);
                     }
                     g[a] += dot(weighted, &r[rows.clone()]);
@@ -150,6 +160,12 @@ pub fn normal_equations<C: AsRef<[f64]> + Sync>(
     }
     h.fill_upper_triangle_with_lower_triangle();
     (h, g)
+}
+
+/// JᵀWr alone.
+pub fn weighted_products<C: AsRef<[f64]>>(j: &[C], w: &[f64], r: &[f64]) -> impl Iterator<Item = f64> {
+    let weighted: Vec<f64> = w.iter().zip(r).map(|(w, r)| w * r).collect();
+    j.iter().map(move |column| dot(column.as_ref(), &weighted))
 }
 
 /// Slopes of residuals (negative, a column for each parameter) mended by what a step made of the residuals: the least change,

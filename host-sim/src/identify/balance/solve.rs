@@ -11,10 +11,13 @@ use crate::identify::linear;
 use crate::identify::same_amplitude::{Seen, log_ratio};
 use crate::identify::term::Parameter;
 
-/// Steps of the reweighted least squares at most, and the square of one, in deviations of the posterior, that changes the
-/// evidence by half of it: nothing depends on less.
-const MOST_ITERATIONS: usize = 10;
-const CONVERGED: f64 = 1e-3;
+/// Steps at most, and the square of one, in deviations of the posterior, that is the last: slopes along the numbers of a coupling
+/// are differences of what is left at such points.
+const MOST_ITERATIONS: usize = 20;
+const CONVERGED: f64 = 1e-5;
+/// The curvature of Student's t that is expected, over that of its weights (K. L. Lange and others, *Journal of the American
+/// Statistical Association* 84, 1989): weights bound the curvature from above, and steps by them are that much too short.
+const EXPECTED_CURVATURE: f64 = (FREEDOM + 1.0) / (FREEDOM + 3.0);
 /// What is held moves by no more than this share of its prior's deviation: no signal tells it so well.
 const HELD: f64 = 1e-4;
 
@@ -28,7 +31,7 @@ pub(super) struct White {
 /// Forms that stand together, each with what is new in its rows.
 pub(super) type Chosen<'f> = [(&'f Alternative, Cow<'f, White>)];
 
-/// A point that reweighted least squares has come to.
+/// A point that a fit has come to.
 struct Point {
     parameters: Vec<Parameter>,
     p: Vec<f64>,
@@ -36,6 +39,42 @@ struct Point {
     innovations: Vec<f64>,
     curvature: DMatrix<f64>,
     slope: DVector<f64>,
+}
+
+/// Priors of parameters, as a step of the fit takes them.
+struct Prior {
+    mean: DVector<f64>,
+    precision: DVector<f64>,
+    lower: Vec<f64>,
+}
+
+impl Prior {
+    fn of(parameters: &[Parameter]) -> Self {
+        let each =
+            |of: fn(&Parameter) -> f64| DVector::from_iterator(parameters.len(), parameters.iter().map(of));
+        Self {
+            mean: each(|q| q.mean),
+            precision: each(|q| q.width(TYPICAL_SCALE).powi(-2)),
+            lower: parameters.iter().map(|q| q.lower).collect(),
+        }
+    }
+
+    /// −ln of the prior, but for constants.
+    fn cost(&self, p: &DVector<f64>) -> f64 {
+        0.5 * (p - &self.mean).map(|off| off * off).dot(&self.precision)
+    }
+
+    /// Where the posterior is largest by the curvature of −ln likelihood and the slope of ln likelihood at a point, and the
+    /// square of the step there in deviations of the posterior.
+    fn step(&self, curvature: &DMatrix<f64>, slope: &DVector<f64>, p: &DVector<f64>) -> (DVector<f64>, f64) {
+        let mut a = curvature.clone();
+        a.set_diagonal(&(a.diagonal() + &self.precision));
+        let g = curvature * p + slope + self.precision.component_mul(&self.mean);
+        let there = linear::solve_bounded(&a, &g, &self.lower);
+        let moved = &there - p;
+        let size = moved.dot(&(&a * &moved));
+        (there, size)
+    }
 }
 
 /// A set that was looked at for one step.
@@ -143,7 +182,8 @@ impl Balance {
         Solved { set: Vec::new(), base: self.base.len(), p, covariance, log_evidence, residual, innovations }
     }
 
-    /// Reweighted least squares, from the weights that residuals nearby have, in so many steps at most.
+    /// Fisher's scoring from the weights that residuals nearby have, in so many steps at most; least squares with these weights
+    /// is the first. Where it overshoots, reweighted least squares, which cannot.
     fn point(
         &self,
         mut parameters: Vec<Parameter>,
@@ -170,39 +210,61 @@ impl Balance {
             .chain(forms.iter().flat_map(|(_, white)| &white.columns))
             .map(Vec::as_slice)
             .collect();
-        let n = parameters.len();
-        let weight = |r: &f64| student_weight(*r) / self.temper;
-        let first = |near: &[f64]| near.iter().map(weight).collect();
-        let mut w: Vec<f64> = near.map_or_else(|| vec![1.0 / self.temper; y.len()], first);
-        let mut p: Vec<f64> = parameters.iter().map(|q| q.mean).collect();
-        let mut r = y.clone();
-        let (mut h, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        let lower: Vec<f64> = parameters.iter().map(|q| q.lower).collect();
-        for step in 0..iterations {
-            if step > 0 {
-                w.iter_mut().zip(&r).for_each(|(w, r)| *w = weight(r));
-            }
-            (h, slope) = linear::normal_equations(&x, &w, &y);
-            let mut g = slope.clone();
-            let mut a = h.clone();
-            for (i, q) in parameters.iter().enumerate() {
-                let width = q.width(TYPICAL_SCALE);
-                a[(i, i)] += 1.0 / width.powi(2);
-                g[i] += q.mean / width.powi(2);
-            }
-            let next = linear::solve_bounded(&a, &g, &lower);
-            let moved = &next - DVector::from_column_slice(&p);
-            p = next.iter().copied().collect();
-            r.copy_from_slice(&y);
-            for (c, p) in x.iter().zip(&p) {
+        let left = |p: &DVector<f64>| {
+            let mut r = y.clone();
+            for (c, p) in x.iter().zip(p) {
                 r.iter_mut().zip(*c).for_each(|(r, x)| *r -= p * x);
             }
-            if moved.dot(&(&a * &moved)) < CONVERGED {
+            r
+        };
+        let prior = Prior::of(&parameters);
+        let weights = |r: &[f64]| r.iter().map(|r| student_weight(*r) / self.temper).collect::<Vec<_>>();
+        let mut w = near.map_or_else(|| vec![1.0 / self.temper; y.len()], weights);
+        let (mut curvature, right) = linear::normal_equations(&x, &w, &y);
+        let (mut p, mut size) = prior.step(&curvature, &right, &DVector::zeros(x.len()));
+        let mut slope = right - &curvature * &p;
+        let mut r = left(&p);
+        let cost = |p: &DVector<f64>, r: &[f64]| prior.cost(p) + self.misfit(r);
+        let mut at = cost(&p, &r);
+        let mut overshot = false;
+        for step in 1..iterations {
+            let before = w.iter().sum::<f64>();
+            w = weights(&r);
+            slope = DVector::from_iterator(x.len(), linear::weighted_products(&x, &w, &r));
+            curvature *= w.iter().sum::<f64>() / before;
+            let share = if overshot { 1.0 } else { EXPECTED_CURVATURE };
+            let (mut there, mut next) = prior.step(&(share * &curvature), &slope, &p);
+            // Weights have changed in kind, and not only in size, where steps do not shrink as those of reweighted least squares.
+            let first = step == 1 && near.is_none();
+            let slow = step > 1 && next > (1.0 - EXPECTED_CURVATURE).powi(2) * size;
+            if next > CONVERGED && (first || slow || overshot) {
+                curvature = linear::normal_equations(&x, &w, &r).0;
+                (there, next) = prior.step(&(share * &curvature), &slope, &p);
+            }
+            let r_there = left(&there);
+            let at_there = cost(&there, &r_there);
+            if at_there > at {
+                if next < CONVERGED {
+                    break;
+                }
+                overshot = true;
+                continue;
+            }
+            (p, r, at, size) = (there, r_there, at_there, next);
+            if size < CONVERGED {
                 break;
             }
         }
-        let slope = slope - &h * DVector::from_column_slice(&p);
-        Point { parameters, p, innovations: r, curvature: h, slope }
+        if iterations > 1 {
+            (curvature, slope) = linear::normal_equations(&x, &weights(&r), &r);
+        }
+        let p = p.iter().copied().collect();
+        Point { parameters, p, innovations: r, curvature, slope }
+    }
+
+    /// −ln likelihood of what is new in each row, but for constants.
+    fn misfit(&self, innovations: &[f64]) -> f64 {
+        0.5 * (FREEDOM + 1.0) * linear::sum_of_logs(innovations, FREEDOM) / self.temper
     }
 
     fn covariance(&self, point: &Point) -> DMatrix<f64> {
@@ -216,8 +278,7 @@ impl Balance {
     fn log_evidence(&self, point: &Point, forms: &Chosen<'_>, covariance: &DMatrix<f64>) -> f64 {
         let Point { parameters, p, innovations, curvature, slope } = point;
         let parameters: Vec<&Parameter> = parameters.iter().collect();
-        let misfit = 0.5 * (FREEDOM + 1.0) * linear::sum_of_logs(innovations, FREEDOM) / self.temper;
-        let at = Expansion { p, parameters: &parameters, misfit, slope, curvature };
+        let at = Expansion { p, parameters: &parameters, misfit: self.misfit(innovations), slope, curvature };
         let waves = self.waves(forms, p, covariance);
         let one_amplitude = |scale: f64| waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
         let log_prior: f64 = forms.iter().map(|(form, _)| form.log_prior).sum();

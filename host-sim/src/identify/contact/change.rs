@@ -77,6 +77,15 @@ pub enum Bridge {
     Normal,
 }
 
+/// Columns in which a form is linear, and which all act through one slope, sample by sample: they change more slowly than the
+/// contact answers.
+pub enum Linear {
+    /// Of the logarithm of friction.
+    LogFactor(Vec<Column>),
+    /// Of the friction channel's amplifier: of its zero (N m), and of what its gain has drifted by.
+    Amplifier([Vec<Column>; 2]),
+}
+
 /// One form of an effect in the contact's balance.
 pub struct ContactTerm {
     /// The effect's id.
@@ -87,8 +96,8 @@ pub struct ContactTerm {
     pub parameters: Vec<Parameter>,
     /// Where its search starts.
     pub starts: Starts,
-    /// Columns of the logarithm of friction in which it is linear, where it is.
-    pub columns: Option<Vec<Column>>,
+    /// Columns in which it is linear, where it has such.
+    pub columns: Option<Linear>,
     /// Whether it is a law that can be exported: a law instead of columns.
     pub law: bool,
     /// The bridge that does the same within its class, where all that it does is an error of one.
@@ -120,7 +129,7 @@ impl ContactTerm {
             form,
             parameters,
             starts: Starts::At(vec![zero]),
-            columns: Some(columns),
+            columns: Some(Linear::LogFactor(columns)),
             law: false,
             error_of: None,
             export: None,
@@ -152,6 +161,17 @@ impl ContactTerm {
                 change.add_gain(&gain, gains);
             }),
         }
+    }
+
+    /// As [`Self::amplifier`], the columns so slow that they move the slip by nothing to speak of.
+    pub fn slow_amplifier(
+        effect: &'static str,
+        form: &'static str,
+        columns: [Vec<Column>; 2],
+        parameters: Vec<Parameter>,
+    ) -> Self {
+        let linear = Some(Linear::Amplifier(columns.clone()));
+        Self { columns: linear, ..Self::amplifier(effect, form, columns, parameters) }
     }
 
     /// With the core's parameters for it.

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::change::{Change, ContactTerm};
+use super::change::{Change, ContactTerm, Linear};
 use super::channel::{Channel, ringing};
 use super::law::{Contact, Curve};
 use super::log::ContactLog;
@@ -18,8 +18,8 @@ use super::observer::{Drive, Observed, SLIP_NOISES, observe};
 use super::struck_mode::innovations;
 use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE, covariance};
 use crate::identify::filters::{exponentials, rms};
-use crate::identify::linear::{self, normal_equations};
-use crate::identify::term::{Parameter, Starts};
+use crate::identify::linear::{self, normal_equations_of};
+use crate::identify::term::{Column, Parameter, Starts};
 
 /// Degrees of freedom of Student's t: tails for what the noise model does not name.
 pub const FREEDOM: f64 = 4.0;
@@ -445,8 +445,7 @@ impl<'a> Problem<'a> {
 
     /// Slopes that change little while other parameters move: those of the baseline, and of ln friction as a whole.
     pub fn slopes(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Slopes {
-        const STEP: f64 = 0.01;
-        let mut change = self.change(terms, p);
+        let change = self.change(terms, p);
         let base = (0..self.baseline.free.len())
             .into_par_iter()
             // What the terms change is the same.
@@ -454,12 +453,23 @@ impl<'a> Problem<'a> {
                 self.difference(p, r, i, self.baseline.free[i].parameter.step, |_| Cow::Borrowed(&change))
             })
             .collect();
-        match &mut change.log_factor {
-            Some(m) => m.iter_mut().flatten().for_each(|m| *m += STEP),
-            none => *none = Some(self.logs.iter().map(|log| vec![STEP; log.len()]).collect()),
-        }
+        Slopes { base, gain: self.raised(change, p, r, |change| &mut change.log_factor) }
+    }
+
+    /// Slope along what a column of a change is raised by everywhere.
+    fn raised(
+        &self,
+        mut change: Change,
+        p: &[f64],
+        r: &[f64],
+        column: impl Fn(&mut Change) -> &mut Option<Column>,
+    ) -> Vec<f64> {
+        const STEP: f64 = 0.01;
+        let nothing = || self.logs.iter().map(|log| vec![0.0; log.len()]).collect();
+        let raised = column(&mut change).get_or_insert_with(nothing);
+        raised.iter_mut().flatten().for_each(|x| *x += STEP);
         let moved = self.scaled(&self.predict_changed(&change, p));
-        Slopes { base, gain: moved.iter().zip(r).map(|(a, b)| (b - a) / STEP).collect() }
+        moved.iter().zip(r).map(|(a, b)| (b - a) / STEP).collect()
     }
 
     /// Slope along one value, by what the terms change there.
@@ -506,13 +516,21 @@ impl<'a> Problem<'a> {
         at: usize,
     ) -> Vec<Vec<f64>> {
         let term = &self.terms[place];
-        match &term.columns {
-            // All columns of ln friction act through one gain.
-            Some(own) => own
-                .iter()
-                .map(|c| c.iter().flatten().zip(&slopes.gain).map(|(x, g)| x * g).collect())
-                .collect(),
-            None => {
+        let through = |slope: &[f64], column: &Column| -> Vec<f64> {
+            column.iter().flatten().zip(slope).map(|(x, slope)| x * slope).collect()
+        };
+        let zero = self.baseline.free.iter().position(|base| base.role == Role::FrictionZero);
+        match (&term.columns, zero) {
+            (Some(Linear::LogFactor(own)), _) => own.iter().map(|c| through(&slopes.gain, c)).collect(),
+            (Some(Linear::Amplifier([zeros, gains])), Some(zero)) => {
+                let mut columns: Vec<_> = zeros.iter().map(|c| through(&slopes.base[zero], c)).collect();
+                if !gains.is_empty() {
+                    let slope = self.raised(self.change(terms, p), p, r, |change| &mut change.gain);
+                    columns.extend(gains.iter().map(|c| through(&slope, c)));
+                }
+                columns
+            }
+            _ => {
                 let others = self.change_but(terms, p, Some(place));
                 let own = at..at + term.parameters.len();
                 let moved = |q: &[f64]| {
@@ -526,22 +544,33 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// JᵀWJ and JᵀWr of iterated least squares on what is new in each sample; it counts as so much.
+    /// JᵀWJ, of these pairs of columns, and JᵀWr of iterated least squares on what is new in each sample; it counts as so much.
     fn normal(
         &self,
         columns: &[Vec<f64>],
         r: &[f64],
         counts: impl Iterator<Item = f64>,
+        wanted: impl Fn(usize, usize) -> bool + Sync,
     ) -> (DMatrix<f64>, DVector<f64>) {
         let new = self.noise.whitened(r);
         let weight = |(r, counts): (&f64, f64)| counts * (FREEDOM + 1.0) / (FREEDOM + r * r);
         let weights: Vec<f64> = new.iter().zip(counts).map(weight).collect();
-        normal_equations(&self.noise.whitened_columns(columns), &weights, &new)
+        normal_equations_of(&self.noise.whitened_columns(columns), &weights, &new, wanted)
     }
 
     /// The same as a fit takes them: all samples count alike.
     pub fn normal_equations(&self, columns: &[Vec<f64>], r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-        self.normal(columns, r, std::iter::repeat(1.0 / self.noise.temper))
+        self.normal_equations_of(columns, r, |_, _| true)
+    }
+
+    /// The same with the products of these pairs of columns alone, the later column first.
+    pub fn normal_equations_of(
+        &self,
+        columns: &[Vec<f64>],
+        r: &[f64],
+        wanted: impl Fn(usize, usize) -> bool + Sync,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        self.normal(columns, r, std::iter::repeat(1.0 / self.noise.temper), wanted)
     }
 
     /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
@@ -691,7 +720,7 @@ impl<'a> Problem<'a> {
 
     /// Curvature of −ln likelihood at a fit, and the slope of ln likelihood.
     fn curvature(&self, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
-        self.normal(&self.jacobian(&fit.terms, &fit.p, &fit.r), &fit.r, self.noise.counts())
+        self.normal(&self.jacobian(&fit.terms, &fit.p, &fit.r), &fit.r, self.noise.counts(), |_, _| true)
     }
 
     /// Takes the noise from what a fit leaves.

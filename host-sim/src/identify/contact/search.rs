@@ -380,11 +380,16 @@ fn table(
     let base_count = j0.len();
     let mut all = j0;
     let mut places = Vec::new();
-    for (columns, _) in &blocks {
+    // Of each column the first beside which it is tried, but for the parent's; a point is tried by itself.
+    let mut beside = vec![0; base_count];
+    for (columns, starts) in &blocks {
         places.push(all.len()..all.len() + columns.len());
+        beside.extend(
+            (all.len()..all.len() + columns.len()).map(|own| if starts.is_empty() { all.len() } else { own }),
+        );
         all.extend(columns.iter().cloned());
     }
-    let (h, g) = problem.normal_equations(&all, &parent.r);
+    let (h, g) = problem.normal_equations_of(&all, &parent.r, |a, b| b < base_count || b >= beside[a]);
     // `prior` of the added columns: deviation and lower bound.
     let gain = |columns: &[usize], prior: &dyn Fn(usize) -> (f64, f64)| -> f64 {
         let index: Vec<usize> = (0..base_count).chain(columns.iter().copied()).collect();

@@ -193,7 +193,7 @@ impl Effect for BridgeDrift {
                 course.columns(|part, gain| over_time(part, &|at, i| if gain { 1.0 } else { load_share(at, i) }));
             let named = |bridge: &str| course.parameters(bridge, ["zero", "gain"], 1.0);
             [
-                ContactTerm::amplifier(self.id(), course.form(["friction", "friction wanders"]), friction, named("friction"))
+                ContactTerm::slow_amplifier(self.id(), course.form(["friction", "friction wanders"]), friction, named("friction"))
                     .as_error_of(Bridge::Friction)
                     .exported(move |p, _| export(course, p, "friction", s_time, s_torque)),
                 ContactTerm::factor(self.id(), course.form(["normal", "normal wanders"]), normal.concat(), named("normal"))
@@ -213,7 +213,7 @@ impl Effect for BridgeDrift {
         let friction = OwnWalk::columns(view.train_count, |log, part| of_log(log, part, &|_, _| s.torque_nm));
         let normal = OwnWalk::columns(view.train_count, |log, part| of_log(log, part, &load_share));
         let apart = [
-            ContactTerm::amplifier(self.id(), "friction wanders in each log", [friction, Vec::new()], walk("friction"))
+            ContactTerm::slow_amplifier(self.id(), "friction wanders in each log", [friction, Vec::new()], walk("friction"))
                 .as_error_of(Bridge::Friction),
             ContactTerm::factor(self.id(), "normal wanders in each log", normal, walk("normal")).as_error_of(Bridge::Normal),
         ];
