@@ -10,6 +10,7 @@ use super::contact::channel::{before_ringing, error_nm, normal_error_n};
 use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
 use super::contact::search::{self, Ranked};
+use super::drive::DriveLog;
 use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales, TIME};
 use super::effects::{ContactView, LIBRARY};
 use super::heard::{ChannelError, Heard, Teller};
@@ -324,25 +325,24 @@ fn of_largest_posterior<'r>(ranked: &'r [Ranked], contributions: &[Vec<Contribut
     &best.unwrap_or(&ranked[0]).fit
 }
 
-/// What the drive's balance sees of the friction channel: no torque where it shows an end of its range, and the torque itself
-/// where its sensor rings. `None` where it does neither.
-pub fn behind_channel(logs: &[ContactLog], change: &Change) -> Option<Vec<ContactLog>> {
+/// The drive's logs as it sees them behind the friction channel, and whether it sees something else than that shows: no torque
+/// where it is at an end of its range, and where its sensor rings the torque itself. `None` where a log has no torque of the motor.
+pub fn drive_logs(logs: &[ContactLog], change: &Change, inertia: f64) -> (Option<Vec<DriveLog>>, bool) {
     let behind = |log: &ContactLog| before_ringing(&log.friction_nm, change.mode?, log.grid.step_s);
-    let torques_nm: Vec<Option<Vec<f64>>> = logs.iter().map(behind).collect();
-    if change.ends_nm.is_none() && torques_nm.iter().all(Option::is_none) {
-        return None;
-    }
-    let mut seen = logs.to_vec();
-    for (log, torque_nm) in seen.iter_mut().zip(torques_nm) {
+    let mut changed = change.ends_nm.is_some();
+    let mut of_log = |log: &ContactLog| {
+        let mut seen = log.clone();
         // The end is one of what the channel shows.
         if let Some(ends) = change.ends_nm {
-            log.leave_out_ends(ends);
+            seen.leave_out_ends(ends);
         }
-        if let Some(torque_nm) = torque_nm {
-            log.friction_nm = torque_nm;
-        }
-    }
-    Some(seen)
+        let Some(torque_nm) = behind(log) else { return DriveLog::of_contact(&seen, inertia) };
+        changed = true;
+        seen.friction_nm = torque_nm;
+        Some(DriveLog::of_contact(&seen, inertia)?.beside_ringing(log))
+    };
+    let drives = logs.iter().map(&mut of_log).collect();
+    (drives, changed)
 }
 
 /// Where the normal channel shows its end, the actuator's balance has no normal force; `None` where it does not.
@@ -414,7 +414,7 @@ mod tests {
     use crate::files::log::Log;
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
-    use crate::identify::filters::rms;
+    use crate::identify::filters::{rms, shifted};
     use crate::identify::noise::White;
     use crate::identify::noise::tests::white;
     use crate::predict::{ContactInputs, simulate_friction};
@@ -514,19 +514,33 @@ mod tests {
         log.set_signal(Signal::M2Speed, vec![5.0; COUNT]);
         log.set_signal(Signal::NormalForce, vec![80.0; COUNT]);
         log.set_signal(Signal::FrictionTorque, shown.clone());
+        log.set_signal(Signal::M2Torque, vec![3.0; COUNT]);
         let logs = [ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()];
-        assert!(behind_channel(&logs, &Change::default()).is_none());
+        assert!(
+            !drive_logs(&logs, &Change::default(), RigFile::assumed_rig(&[]).unwrap().m2_inertia_kg_m2).1
+        );
         let change = Change { mode: Some(MODE), ends_nm: Some((0.0, 2.5)), ..Change::default() };
-        let seen = &behind_channel(&logs, &change).expect("it rings and has an end")[0];
+        let (Some(seen), true) =
+            drive_logs(&logs, &change, RigFile::assumed_rig(&[]).unwrap().m2_inertia_kg_m2)
+        else {
+            panic!("it rings and has an end")
+        };
+        let DriveLog { friction: Some(friction_nm), ringing: Some(ringing), usable, .. } = &seen[0] else {
+            panic!("it has a torque and rings")
+        };
         // Between the steps, whose edges a filter rounds.
         let off = |values: &[f64]| {
             let between = (20..COUNT).filter(|i| (20..380).contains(&(i % 400)));
             rms(&between.map(|i| values[i] - torque(i)).collect::<Vec<f64>>())
         };
-        let [behind, before] = [off(&seen.friction_nm), off(&shown)];
+        let [behind, before] = [off(friction_nm), off(&shown)];
         assert!(behind < 0.1 * before, "{behind} {before}");
+        let both: Vec<f64> =
+            friction_nm.iter().zip(ringing).map(|(torque, ringing)| torque + ringing).collect();
+        let shown_nm = shifted(&logs[0].friction_nm, logs[0].friction_late);
+        assert!(both.iter().zip(&shown_nm).all(|(both, shown)| (both - shown).abs() < 1e-9));
         // A ring that overshoots an end of the range is known no better than one that does not.
         let beyond = (0..COUNT).find(|i| shown[*i] > 2.6).expect("an overshoot");
-        assert!(!seen.usable[beyond] && seen.usable[200]);
+        assert!(!usable[beyond] && usable[200]);
     }
 }

@@ -69,6 +69,8 @@ pub struct DriveLog {
     pub position: Vec<f64>,
     /// Friction torque on the disc, taken ahead by its sensor's delay; `None` where nothing is pressed.
     pub friction: Option<Vec<f64>>,
+    /// What the sensor shows beside it by ringing, where that was taken off.
+    pub ringing: Option<Vec<f64>>,
     /// What of it is the bridge's noise where the torque rests; 0 where it does not. The motor's torque knows nothing of that, and a
     /// coupling that let less of it through would look better for it: the base may leave it out too.
     pub friction_noise: Option<Vec<f64>>,
@@ -174,6 +176,7 @@ impl DriveLog {
             effort,
             position,
             friction,
+            ringing: None,
             friction_noise,
             load_n,
             usable,
@@ -183,6 +186,15 @@ impl DriveLog {
             width,
             inertial_noise,
         }
+    }
+
+    /// With what the contact log shows beside the torque by its sensor's ringing.
+    #[must_use]
+    pub fn beside_ringing(self, shown: &ContactLog) -> Self {
+        let shown = filters::shifted(&shown.friction_nm, shown.friction_late);
+        let ringing =
+            self.friction.as_ref().map(|friction| shown.iter().zip(friction).map(|(a, b)| a - b).collect());
+        Self { ringing, ..self }
     }
 
     /// Points of the grid.
@@ -421,6 +433,16 @@ pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> B
         .without_noise_of(NOISE_SHARE);
     // A drive alone is looked at for its ripple.
     if contact { balance } else { balance.without_rests() }
+}
+
+/// The response of a balance of these logs as the friction channel shows it, with its ringing; `None` where none was taken off.
+pub fn shown_response(balance: &Balance, logs: &[DriveLog]) -> Option<Vec<f64>> {
+    logs.iter().any(|log| log.ringing.is_some()).then(|| {
+        let of_log = |log: &DriveLog| {
+            log.ringing.as_ref().map_or_else(|| vec![0.0; log.len()], |ringing| log.filtered(ringing))
+        };
+        balance.response.iter().zip(logs.iter().flat_map(of_log)).map(|(y, ringing)| y - ringing).collect()
+    })
 }
 
 /// Rows of a log: noise from named sources; near standstill the bearing's friction is a reaction.

@@ -115,14 +115,8 @@ pub fn errors(
         let place = found.place(Part::Friction).unwrap_or(0);
         let prepared = ContactLog::all(logs, rig, &contact.baseline.numbers)?;
         let change = contact.change(place);
-        let sensed = contact_part::behind_channel(&prepared, &change);
-        let told = contact.heard(Part::Drive, sensed.as_ref().unwrap_or(&prepared), training);
-        let drives: Option<Vec<DriveLog>> = sensed
-            .as_ref()
-            .unwrap_or(&prepared)
-            .iter()
-            .map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2))
-            .collect();
+        let told = contact.heard(Part::Drive, &prepared, training);
+        let (drives, _) = contact_part::drive_logs(&prepared, &change, rig.m2_inertia_kg_m2);
         let following = match (&contact.disc_cause, &found.drive, &drives) {
             (Some(cause), Some(drive), Some(drives)) if found.best().effects.contains(&cause.effect) => {
                 if training {
@@ -351,6 +345,10 @@ fn drive_alternatives(
     let prior = rig.map(linear_part::drive_prior).unwrap_or_default();
     let scales = DriveScales::new(logs);
     let balance = drive::balance(logs, &prior, &scales);
+    let balance = match drive::shown_response(&balance, logs) {
+        Some(response) => balance.with_response(response),
+        None => balance,
+    };
     let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(solved);
     let residual: Vec<f64> = {
         let mut r = balance.response.clone();

@@ -5,6 +5,7 @@
 //! take for friction is decided by the drive, without a rule.
 
 use super::contact::baseline::{KNOWN_WITHIN, baseline};
+use super::contact::change::Change;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::ringing::fast_line;
@@ -148,26 +149,20 @@ struct Motors<'r> {
 }
 
 impl Motors<'_> {
-    fn search_drive(rig: &RigFile, logs: &[ContactLog]) -> Option<Linear> {
-        let logs = Self::drive_logs(rig, logs)?;
-        Some(linear_part::search_drive(&logs, &linear_part::drive_prior(rig), true))
-    }
-
-    fn drive_logs(rig: &RigFile, logs: &[ContactLog]) -> Option<Vec<DriveLog>> {
-        logs.iter().map(|log| DriveLog::of_contact(log, rig.m2_inertia_kg_m2)).collect()
+    fn search_drive(rig: &RigFile, logs: &[DriveLog]) -> Linear {
+        linear_part::search_drive(logs, &linear_part::drive_prior(rig), true)
     }
 
     /// Hears of the channels what the contact says, and forgets what it said before. A balance is searched again where its logs
     /// change.
     fn hear(&mut self, contact: &ContactPart, progress: &(dyn Fn(&str) + Sync)) {
         let rig = self.rig;
-        let seen = contact_part::behind_channel(self.logs, &contact.best_change());
-        let before = std::mem::replace(&mut self.behind_channel, seen.is_some());
-        let logs = seen.as_deref().unwrap_or(self.logs);
-        if before || seen.is_some() {
-            self.drive = Self::search_drive(rig, logs);
+        let (logs, behind) =
+            contact_part::drive_logs(self.logs, &contact.best_change(), rig.m2_inertia_kg_m2);
+        if std::mem::replace(&mut self.behind_channel, behind) || behind {
+            self.drive = logs.as_ref().map(|logs| Self::search_drive(rig, logs));
         }
-        if let (Some(drive), Some(logs)) = (&mut self.drive, Self::drive_logs(rig, logs)) {
+        if let (Some(drive), Some(logs)) = (&mut self.drive, logs) {
             drive.forget();
             let heard = contact.heard(Part::Drive, &contact.logs, true);
             drive.tell(
@@ -229,7 +224,8 @@ fn of_contact_logs(
         train.iter().zip(&logs).filter_map(|(log, seen)| speed_note(log, seen.jitter_s)).collect();
     notes.extend(logs.iter().filter_map(|log| ring_note(log, rig)));
     progress("drive");
-    let drive = Motors::search_drive(rig, &logs);
+    let (as_shown, _) = contact_part::drive_logs(&logs, &Change::default(), rig.m2_inertia_kg_m2);
+    let drive = as_shown.map(|logs| Motors::search_drive(rig, &logs));
     let searched = |drive: Option<&Linear>| ContactPart::searched(&logs, (model, rig), drive, progress);
     let mut contact = searched(drive.as_ref());
     let mut motors =

@@ -81,6 +81,16 @@ impl Linear {
         contact.told(part, 0).into_iter().filter(costs).map(|effect| (part, effect)).collect()
     }
 
+    /// With its sets weighed by another response: they were looked for where a channel does not ring, which whoever says that it
+    /// does not has to answer for. They stay in their order.
+    #[must_use]
+    pub fn weighed_by(self, response: Vec<f64>) -> Self {
+        let balance = self.balance.with_response(response);
+        let solve = |solved: &Solved| balance.solve(&self.alternatives, &solved.set);
+        let solved = self.solved.par_iter().map(solve).collect();
+        Self { balance, solved, ..self }
+    }
+
     /// Takes back what the contact has told.
     pub fn forget(&mut self) {
         let told: Vec<bool> = self.solved.iter().map(|solved| !self.told(solved).is_empty()).collect();
@@ -205,7 +215,8 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
         LIBRARY.par_iter().filter(|e| wanted(e.id())).flat_map(|effect| effect.drive(&view)).collect()
     };
     let (alternatives, solved) = balance::search(&mut balance, &propose, MOST_CAUSES);
-    Linear {
+    let shown = drive::shown_response(&balance, logs);
+    let found = Linear {
         balance,
         alternatives,
         solved,
@@ -215,6 +226,10 @@ pub fn search_drive(logs: &[DriveLog], prior: &DrivePrior, rotary: bool) -> Line
         inertia,
         normal_load_scales: None,
         heard: Vec::new(),
+    };
+    match shown {
+        Some(response) => found.weighed_by(response),
+        None => found,
     }
 }
 
@@ -326,5 +341,25 @@ mod tests {
         let (closed, _) = heard(&shown_nm, &error_nm, &[]);
         let (gained, p) = heard(&shown_nm, &error_nm, &[&open_nm]);
         assert!(gained > closed - LOG_PRIOR && (p[1] + 1.5).abs() < 0.05, "{gained} {closed} {p:?}");
+    }
+
+    #[test]
+    fn a_channel_that_does_not_ring_has_to_answer_for_what_it_shows_of_ringing() {
+        let ringing_nm: Vec<f64> = (0..ROWS).map(|i| 0.3 * (0.2 * i as f64).cos()).collect();
+        // The response has nothing of it: the channel's torque is that behind the ring.
+        let (balance, [log]) = drive(&vec![0.0; ROWS]);
+        assert!(drive::shown_response(&balance, std::slice::from_ref(&log)).is_none());
+        let logs = [DriveLog { ringing: Some(ringing_nm.clone()), ..log }];
+        let response = drive::shown_response(&balance, &logs).expect("it was taken off");
+        let told = Heard { effect: "channel", error: vec![ringing_nm], open: Vec::new() };
+        let [none, ring] = [Vec::new(), heard_by_drive(&[told], &logs)];
+        let evidence = |balance: &Balance, forms: &[Alternative]| {
+            balance.solve_forms(&forms.iter().collect::<Vec<_>>()).log_evidence
+        };
+        let behind = evidence(&balance, &none);
+        let shown = balance.with_response(response);
+        let [with, without] = [&ring, &none].map(|forms| behind - evidence(&shown, forms));
+        // The form costs what is known of its size.
+        assert!(with < -LOG_PRIOR && without > 100.0 * with, "{with} {without}");
     }
 }

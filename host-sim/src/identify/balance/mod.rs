@@ -292,6 +292,13 @@ impl Balance {
         self.white_base = self.whitening.of_columns(&base);
     }
 
+    /// With another response of the same rows.
+    #[must_use]
+    pub fn with_response(self, response: Vec<f64>) -> Self {
+        let white_response = self.whitening.of(&response);
+        Self { response, white_response, ..self }
+    }
+
     /// As one whose response may ripple all the time.
     #[must_use]
     pub fn without_rests(self) -> Self {

@@ -37,9 +37,9 @@ pub struct Change {
 }
 
 impl Change {
-    /// Whether it changes the friction channel's amplifier or its lateness.
+    /// Whether it changes what the friction channel shows of a torque, but for the ends of its range.
     pub fn changes_friction_channel(&self) -> bool {
-        self.zero_nm.is_some() || self.gain.is_some() || self.late_s != 0.0
+        self.zero_nm.is_some() || self.gain.is_some() || self.late_s != 0.0 || self.mode.is_some()
     }
 
     /// Adds `size` times a column to the logarithm of friction.
@@ -198,8 +198,8 @@ impl ContactTerm {
         change
     }
 
-    /// Whether what it changes with these values is what a channel shows: amplifier or lateness of that of friction, or all that
-    /// the other one is taken for.
+    /// Whether what it changes with these values is what a channel shows: that of friction, or all that the other one is taken
+    /// for.
     pub fn changes_channel(&self, values: &[f64]) -> bool {
         self.heard_by() == Part::Pressure || self.change(values).changes_friction_channel()
     }

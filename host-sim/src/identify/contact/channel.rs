@@ -40,8 +40,7 @@ pub fn before_ringing(shown: &[f64], mode: (f64, f64), step_s: f64) -> Option<Ve
     })
 }
 
-/// What a change adds to the torque that the friction channel of each log shows, N m; `None` where it changes neither its
-/// amplifier nor its lateness.
+/// What a change adds to the torque that the friction channel of each log shows, N m; `None` where it changes nothing of it.
 pub fn error_nm(logs: &[ContactLog], change: &Change) -> Option<Vec<Vec<f64>>> {
     let of_log = |(at, log)| Channel::of_effects(log, at, change).error_nm();
     change.changes_friction_channel().then(|| logs.iter().enumerate().map(of_log).collect())
@@ -99,14 +98,16 @@ impl<'a> Channel<'a> {
         self.late
     }
 
-    /// What its amplifier and its lateness add to the torque that it shows, N m, taken ahead by the rig file's delay.
+    /// What its amplifier, its lateness and a mode add to the torque that it shows, N m, taken ahead by the rig file's delay.
     pub(super) fn error_nm(&mut self) -> Vec<f64> {
         let log = self.log;
         // The noise of a channel is no error of its lateness: it would be there twice, now and when it was late.
         let smooth_nm = adaptively_smoothed(&log.friction_nm, log.friction_noise_nm);
         let mut shown_nm = shifted(&smooth_nm, log.friction_late);
         let delayed = self.before_delay(Cow::Owned(smooth_nm));
-        let torque_nm = self.before_amplifier(delayed);
+        let acted = self.before_amplifier(delayed);
+        let behind = self.ringing.and_then(|mode| before_ringing(&acted, mode, log.grid.step_s));
+        let torque_nm = behind.map_or(acted, Cow::Owned);
         shown_nm.iter_mut().zip(torque_nm.iter()).for_each(|(shown, torque)| *shown -= torque);
         shown_nm
     }
@@ -306,10 +307,22 @@ mod tests {
             let expected = series(|i| shown(i + rig_late) - torque(i));
             assert!(off(&error[0], &expected) < 1e-4, "{late} {rig_late}: {}", off(&error[0], &expected));
         }
-        assert!(
-            error_nm(&[log(series(torque))], &Change { mode: Some((80.0, 0.1)), ..Change::default() })
-                .is_none()
-        );
+        assert!(error_nm(&[log(series(torque))], &Change::default()).is_none());
+    }
+
+    #[test]
+    fn what_the_sensors_mode_rings_with_is_no_torque() {
+        let torque = |i: f64| 3.0 * (0.01 * i).sin() + if i % 400.0 < 200.0 { 1.0 } else { 0.0 };
+        let change = Change { mode: Some((40.0, 0.02)), ..Change::default() };
+        let acted = log(series(torque));
+        let shown_nm =
+            Channel::new(&acted, 0, &change, &numbers(0.0)).mode(Cow::Owned(series(torque))).into_owned();
+        let expected: Vec<f64> =
+            shown_nm.iter().zip(series(torque)).map(|(shown, acted)| shown - acted).collect();
+        let error = error_nm(&[log(shown_nm)], &change).expect("it has one");
+        let left: Vec<f64> = error[0].iter().zip(&expected).map(|(a, b)| a - b).collect();
+        // What is smoothed of the torque's steps.
+        assert!(rms(&left) < 0.2 * rms(&expected), "{} of {}", rms(&left), rms(&expected));
     }
 
     #[test]
