@@ -6,6 +6,7 @@
 //!
 //! The noisy side is the response: torques carry the noise, angles little of it.
 
+mod scoring;
 mod search;
 mod solve;
 

@@ -2,22 +2,15 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
+use super::scoring::{Fit, MOST_STEPS, Rows, misfit};
 use super::{Alternative, Balance, Solved, placed};
-use crate::identify::contact::problem::{FREEDOM, student_weight};
-use crate::identify::evidence::{BALANCE_SHARE, Expansion, TYPICAL_SCALE};
+use crate::identify::evidence::{BALANCE_SHARE, Expansion};
 use crate::identify::linear;
 use crate::identify::same_amplitude::{Seen, log_ratio};
 use crate::identify::term::Parameter;
 
-/// Steps at most, and the square of one, in deviations of the posterior, that is the last: slopes along the numbers of a coupling
-/// are differences of what is left at such points.
-const MOST_ITERATIONS: usize = 20;
-const CONVERGED: f64 = 1e-5;
-/// The curvature of Student's t that is expected, over that of its weights (K. L. Lange and others, *Journal of the American
-/// Statistical Association* 84, 1989): weights bound the curvature from above, and steps by them are that much too short.
-const EXPECTED_CURVATURE: f64 = (FREEDOM + 1.0) / (FREEDOM + 3.0);
 /// What is held moves by no more than this share of its prior's deviation: no signal tells it so well.
 const HELD: f64 = 1e-4;
 
@@ -31,50 +24,10 @@ pub(super) struct White {
 /// Forms that stand together, each with what is new in its rows.
 pub(super) type Chosen<'f> = [(&'f Alternative, Cow<'f, White>)];
 
-/// A point that a fit has come to.
+/// A fit with the parameters that were fitted.
 struct Point {
     parameters: Vec<Parameter>,
-    p: Vec<f64>,
-    /// What is new in each row, over its deviation.
-    innovations: Vec<f64>,
-    curvature: DMatrix<f64>,
-    slope: DVector<f64>,
-}
-
-/// Priors of parameters, as a step of the fit takes them.
-struct Prior {
-    mean: DVector<f64>,
-    precision: DVector<f64>,
-    lower: Vec<f64>,
-}
-
-impl Prior {
-    fn of(parameters: &[Parameter]) -> Self {
-        let each =
-            |of: fn(&Parameter) -> f64| DVector::from_iterator(parameters.len(), parameters.iter().map(of));
-        Self {
-            mean: each(|q| q.mean),
-            precision: each(|q| q.width(TYPICAL_SCALE).powi(-2)),
-            lower: parameters.iter().map(|q| q.lower).collect(),
-        }
-    }
-
-    /// −ln of the prior, but for constants.
-    fn cost(&self, p: &DVector<f64>) -> f64 {
-        0.5 * (p - &self.mean).map(|off| off * off).dot(&self.precision)
-    }
-
-    /// Where the posterior is largest by the curvature of −ln likelihood and the slope of ln likelihood at a point, and the
-    /// square of the step there in deviations of the posterior.
-    fn step(&self, curvature: &DMatrix<f64>, slope: &DVector<f64>, p: &DVector<f64>) -> (DVector<f64>, f64) {
-        let mut a = curvature.clone();
-        a.set_diagonal(&(a.diagonal() + &self.precision));
-        let g = curvature * p + slope + self.precision.component_mul(&self.mean);
-        let there = linear::solve_bounded(&a, &g, &self.lower);
-        let moved = &there - p;
-        let size = moved.dot(&(&a * &moved));
-        (there, size)
-    }
+    fit: Fit,
 }
 
 /// A set that was looked at for one step.
@@ -120,7 +73,7 @@ impl Balance {
     pub(super) fn glance(&self, set: Vec<usize>, forms: &Chosen<'_>, near: &[f64]) -> Glance {
         let point = self.point(self.priors(), forms, Some(near), 1);
         let log_evidence = self.log_evidence(&point, forms, &self.covariance(&point));
-        Glance { set, log_evidence, innovations: point.innovations }
+        Glance { set, log_evidence, innovations: point.fit.innovations }
     }
 
     /// Solves these forms; the set of what it gives is empty.
@@ -166,7 +119,7 @@ impl Balance {
 
     /// These forms, with these priors of the base.
     fn solved(&self, priors: Vec<Parameter>, forms: &Chosen<'_>, near: Option<&[f64]>) -> Solved {
-        let point = self.point(priors, forms, near, MOST_ITERATIONS);
+        let point = self.point(priors, forms, near, MOST_STEPS);
         let covariance = self.covariance(&point);
         let log_evidence = self.log_evidence(&point, forms, &covariance);
         let mut residual = self.response.clone();
@@ -175,15 +128,14 @@ impl Balance {
         }
         let base = self.base.iter().map(|b| &b.1);
         let columns = base.chain(forms.iter().flat_map(|(form, _)| form.columns.iter()));
-        for (c, p) in columns.zip(&point.p) {
+        for (c, p) in columns.zip(&point.fit.p) {
             residual.iter_mut().zip(c).for_each(|(r, x)| *r -= p * x);
         }
-        let Point { p, innovations, .. } = point;
+        let Fit { p, innovations, .. } = point.fit;
         Solved { set: Vec::new(), base: self.base.len(), p, covariance, log_evidence, residual, innovations }
     }
 
-    /// Fisher's scoring from the weights that residuals nearby have, in so many steps at most; least squares with these weights
-    /// is the first. Where it overshoots, reweighted least squares, which cannot.
+    /// Parameters of these forms, from the weights that residuals nearby have, in so many steps at most.
     fn point(
         &self,
         mut parameters: Vec<Parameter>,
@@ -210,65 +162,12 @@ impl Balance {
             .chain(forms.iter().flat_map(|(_, white)| &white.columns))
             .map(Vec::as_slice)
             .collect();
-        let left = |p: &DVector<f64>| {
-            let mut r = y.clone();
-            for (c, p) in x.iter().zip(p) {
-                r.iter_mut().zip(*c).for_each(|(r, x)| *r -= p * x);
-            }
-            r
-        };
-        let prior = Prior::of(&parameters);
-        let weights = |r: &[f64]| r.iter().map(|r| student_weight(*r) / self.temper).collect::<Vec<_>>();
-        let mut w = near.map_or_else(|| vec![1.0 / self.temper; y.len()], weights);
-        let (mut curvature, right) = linear::normal_equations(&x, &w, &y);
-        let (mut p, mut size) = prior.step(&curvature, &right, &DVector::zeros(x.len()));
-        let mut slope = right - &curvature * &p;
-        let mut r = left(&p);
-        let cost = |p: &DVector<f64>, r: &[f64]| prior.cost(p) + self.misfit(r);
-        let mut at = cost(&p, &r);
-        let mut overshot = false;
-        for step in 1..iterations {
-            let before = w.iter().sum::<f64>();
-            w = weights(&r);
-            slope = DVector::from_iterator(x.len(), linear::weighted_products(&x, &w, &r));
-            curvature *= w.iter().sum::<f64>() / before;
-            let share = if overshot { 1.0 } else { EXPECTED_CURVATURE };
-            let (mut there, mut next) = prior.step(&(share * &curvature), &slope, &p);
-            // Weights have changed in kind, and not only in size, where steps do not shrink as those of reweighted least squares.
-            let first = step == 1 && near.is_none();
-            let slow = step > 1 && next > (1.0 - EXPECTED_CURVATURE).powi(2) * size;
-            if next > CONVERGED && (first || slow || overshot) {
-                curvature = linear::normal_equations(&x, &w, &r).0;
-                (there, next) = prior.step(&(share * &curvature), &slope, &p);
-            }
-            let r_there = left(&there);
-            let at_there = cost(&there, &r_there);
-            if at_there > at {
-                if next < CONVERGED {
-                    break;
-                }
-                overshot = true;
-                continue;
-            }
-            (p, r, at, size) = (there, r_there, at_there, next);
-            if size < CONVERGED {
-                break;
-            }
-        }
-        if iterations > 1 {
-            (curvature, slope) = linear::normal_equations(&x, &weights(&r), &r);
-        }
-        let p = p.iter().copied().collect();
-        Point { parameters, p, innovations: r, curvature, slope }
-    }
-
-    /// −ln likelihood of what is new in each row, but for constants.
-    fn misfit(&self, innovations: &[f64]) -> f64 {
-        0.5 * (FREEDOM + 1.0) * linear::sum_of_logs(innovations, FREEDOM) / self.temper
+        let fit = Rows { x, y, temper: self.temper }.fit(&parameters, near, iterations);
+        Point { parameters, fit }
     }
 
     fn covariance(&self, point: &Point) -> DMatrix<f64> {
-        let mut posterior = point.curvature.clone();
+        let mut posterior = point.fit.curvature.clone();
         for (i, q) in point.parameters.iter().enumerate() {
             posterior[(i, i)] += 1.0 / q.sd.powi(2);
         }
@@ -276,9 +175,15 @@ impl Balance {
     }
 
     fn log_evidence(&self, point: &Point, forms: &Chosen<'_>, covariance: &DMatrix<f64>) -> f64 {
-        let Point { parameters, p, innovations, curvature, slope } = point;
+        let Point { parameters, fit: Fit { p, innovations, curvature, slope } } = point;
         let parameters: Vec<&Parameter> = parameters.iter().collect();
-        let at = Expansion { p, parameters: &parameters, misfit: self.misfit(innovations), slope, curvature };
+        let at = Expansion {
+            p,
+            parameters: &parameters,
+            misfit: misfit(innovations, self.temper),
+            slope,
+            curvature,
+        };
         let waves = self.waves(forms, p, covariance);
         let one_amplitude = |scale: f64| waves.iter().map(|(logs, sd)| log_ratio(logs, sd * scale)).sum();
         let log_prior: f64 = forms.iter().map(|(form, _)| form.log_prior).sum();
