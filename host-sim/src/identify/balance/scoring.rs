@@ -168,7 +168,7 @@ mod tests {
         // Noise as it should be, a tenth of the rows far off, and a third; a size within its range and one beyond.
         for (off, every, fast_size) in [(0.0, 1, 0.3), (40.0, 10, 0.3), (40.0, 10, -0.3), (40.0, 3, 0.3)] {
             // They pull one size.
-            let stray = |i: usize| if i % every == 0 { off * slow[i] } else { 0.0 };
+            let stray = |i: usize| if i.is_multiple_of(every) { off * slow[i] } else { 0.0 };
             let y = (0..ROWS).map(|i| 5.0 * slow[i] + fast_size * fast[i] + noise[i] + stray(i)).collect();
             let rows = Rows { x: vec![&slow, &fast], y, temper: 2.0 };
             let truth = reweighted(&rows, &sizes);
