@@ -1,5 +1,7 @@
 //! The contact, searched, and what the drive's causes and the channels' ends change in the other balances.
 
+use std::borrow::Cow;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -331,14 +333,14 @@ pub fn drive_logs(logs: &[ContactLog], change: &Change, inertia: f64) -> (Option
     let behind = |log: &ContactLog| before_ringing(&log.friction_nm, change.mode?, log.grid.step_s);
     let mut changed = change.ends_nm.is_some();
     let mut of_log = |log: &ContactLog| {
-        let mut seen = log.clone();
+        let mut seen = Cow::Borrowed(log);
         // The end is one of what the channel shows.
         if let Some(ends) = change.ends_nm {
-            seen.leave_out_ends(ends);
+            seen.to_mut().leave_out_ends(ends);
         }
         let Some(torque_nm) = behind(log) else { return DriveLog::of_contact(&seen, inertia) };
         changed = true;
-        seen.friction_nm = torque_nm;
+        seen.to_mut().friction_nm = torque_nm;
         Some(DriveLog::of_contact(&seen, inertia)?.beside_ringing(log))
     };
     let drives = logs.iter().map(&mut of_log).collect();

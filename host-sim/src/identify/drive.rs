@@ -69,11 +69,11 @@ pub struct DriveLog {
     pub position: Vec<f64>,
     /// Friction torque on the disc, taken ahead by its sensor's delay; `None` where nothing is pressed.
     pub friction: Option<Vec<f64>>,
-    /// What the sensor shows beside it by ringing, where that was taken off.
-    pub ringing: Option<Vec<f64>>,
     /// What of it is the bridge's noise where the torque rests; 0 where it does not. The motor's torque knows nothing of that, and a
     /// coupling that let less of it through would look better for it: the base may leave it out too.
     pub friction_noise: Option<Vec<f64>>,
+    /// What the sensor shows beside the torque by ringing, where that was taken off.
+    pub ringing: Option<Vec<f64>>,
     /// Normal force.
     pub load_n: Option<Vec<f64>>,
     /// Points that take part.
@@ -365,7 +365,7 @@ pub struct DrivePrior {
     pub bridge_zero: Option<f64>,
 }
 
-/// The balance of these logs. `friction` replaces what the logs have, where a sensor fault is taken off.
+/// The balance of these logs.
 pub fn balance(logs: &[DriveLog], prior: &DrivePrior, scales: &DriveScales) -> Balance {
     let contact = logs.iter().any(|log| log.friction.is_some());
     let concat = |of: &dyn Fn(&DriveLog) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();

@@ -203,6 +203,25 @@ mod tests {
     }
 
     #[test]
+    fn products_that_are_not_asked_for_are_nothing_and_the_others_the_same() {
+        let rows = ROWS_OF_A_TASK + 300;
+        let columns: Vec<Vec<f64>> =
+            (1..5).map(|c| (0..rows).map(|i| (0.01 * (c * i) as f64).sin()).collect()).collect();
+        let (w, r): (Vec<f64>, Vec<f64>) = (0..rows).map(|i| (1.0 + (i % 7) as f64, (i % 11) as f64)).unzip();
+        let (all, right) = normal_equations(&columns, &w, &r);
+        let wanted = |a: usize, b: usize| b < 2 || a == b;
+        let (some, same) = normal_equations_of(&columns, &w, &r, wanted);
+        assert_eq!(right, same);
+        for (a, b) in (0..4).flat_map(|a| (0..4).map(move |b| (a, b))) {
+            let expected = if wanted(a.max(b), a.min(b)) { all[(a, b)] } else { 0.0 };
+            assert_eq!(some[(a, b)], expected, "{a} {b}");
+        }
+        for (product, right) in weighted_products(&columns, &w, &r).zip(&right) {
+            assert!((product - right).abs() < 1e-9 * rows as f64);
+        }
+    }
+
+    #[test]
     fn mended_slopes_tell_the_step_and_what_is_across_it_stays() {
         let residual = |p: [f64; 2]| vec![1.0 - p[0] - 0.3 * p[0] * p[0], 2.0 - 4.0 * p[1], p[0] * p[1]];
         let [from, to] = [[0.2, 0.1], [0.5, -0.1]];

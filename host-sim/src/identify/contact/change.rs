@@ -79,7 +79,7 @@ pub enum Bridge {
 
 /// Columns in which a form is linear, and which all act through one slope, sample by sample: they change more slowly than the
 /// contact answers.
-pub enum Linear {
+pub enum Columns {
     /// Of the logarithm of friction.
     LogFactor(Vec<Column>),
     /// Of the friction channel's amplifier: of its zero (N m), and of what its gain has drifted by.
@@ -97,7 +97,7 @@ pub struct ContactTerm {
     /// Where its search starts.
     pub starts: Starts,
     /// Columns in which it is linear, where it has such.
-    pub columns: Option<Linear>,
+    pub columns: Option<Columns>,
     /// Whether it is a law that can be exported: a law instead of columns.
     pub law: bool,
     /// The bridge that does the same within its class, where all that it does is an error of one.
@@ -129,7 +129,7 @@ impl ContactTerm {
             form,
             parameters,
             starts: Starts::At(vec![zero]),
-            columns: Some(Linear::LogFactor(columns)),
+            columns: Some(Columns::LogFactor(columns)),
             law: false,
             error_of: None,
             export: None,
@@ -170,7 +170,7 @@ impl ContactTerm {
         columns: [Vec<Column>; 2],
         parameters: Vec<Parameter>,
     ) -> Self {
-        let linear = Some(Linear::Amplifier(columns.clone()));
+        let linear = Some(Columns::Amplifier(columns.clone()));
         Self { columns: linear, ..Self::amplifier(effect, form, columns, parameters) }
     }
 

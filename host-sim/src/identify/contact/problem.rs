@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::change::{Change, ContactTerm, Linear};
+use super::change::{Change, Columns, ContactTerm};
 use super::channel::{Channel, ringing};
 use super::law::{Contact, Curve};
 use super::log::ContactLog;
@@ -468,8 +468,7 @@ impl<'a> Problem<'a> {
         let nothing = || self.logs.iter().map(|log| vec![0.0; log.len()]).collect();
         let raised = column(&mut change).get_or_insert_with(nothing);
         raised.iter_mut().flatten().for_each(|x| *x += STEP);
-        let moved = self.scaled(&self.predict_changed(&change, p));
-        moved.iter().zip(r).map(|(a, b)| (b - a) / STEP).collect()
+        self.slope_to(&change, p, r, STEP)
     }
 
     /// Slope along one value, by what the terms change there.
@@ -483,7 +482,12 @@ impl<'a> Problem<'a> {
     ) -> Vec<f64> {
         let mut q = p.to_vec();
         q[i] += step;
-        let moved = self.scaled(&self.predict_changed(&change(&q), &q));
+        self.slope_to(&change(&q), &q, r, step)
+    }
+
+    /// Slope from these residuals to those of a point that is a step away.
+    fn slope_to(&self, change: &Change, p: &[f64], r: &[f64], step: f64) -> Vec<f64> {
+        let moved = self.scaled(&self.predict_changed(change, p));
         moved.iter().zip(r).map(|(a, b)| (b - a) / step).collect()
     }
 
@@ -521,8 +525,8 @@ impl<'a> Problem<'a> {
         };
         let zero = self.baseline.free.iter().position(|base| base.role == Role::FrictionZero);
         match (&term.columns, zero) {
-            (Some(Linear::LogFactor(own)), _) => own.iter().map(|c| through(&slopes.gain, c)).collect(),
-            (Some(Linear::Amplifier([zeros, gains])), Some(zero)) => {
+            (Some(Columns::LogFactor(own)), _) => own.iter().map(|c| through(&slopes.gain, c)).collect(),
+            (Some(Columns::Amplifier([zeros, gains])), Some(zero)) => {
                 let mut columns: Vec<_> = zeros.iter().map(|c| through(&slopes.base[zero], c)).collect();
                 if !gains.is_empty() {
                     let slope = self.raised(self.change(terms, p), p, r, |change| &mut change.gain);
