@@ -60,9 +60,9 @@ impl Rows<'_> {
             curvature *= w.iter().sum::<f64>() / before;
             let share = if overshot { 1.0 } else { EXPECTED_CURVATURE };
             let (mut there, mut next) = prior.step(&(share * &curvature), &slope, &p);
-            // Weights have changed in kind, and not only in size, where steps do not shrink as those of reweighted least squares.
+            // Weights have changed in kind, and not only in size, where steps do not shrink.
             let first = step == 1 && near.is_none();
-            let slow = step > 1 && next > (1.0 - EXPECTED_CURVATURE).powi(2) * size;
+            let slow = step > 1 && next > size;
             if next > CONVERGED && (first || slow || overshot) {
                 curvature = linear::normal_equations(&self.x, &w, &r).0;
                 (there, next) = prior.step(&(share * &curvature), &slope, &p);
