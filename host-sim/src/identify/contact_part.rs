@@ -335,7 +335,7 @@ pub fn drive_logs(logs: &[ContactLog], change: &Change, inertia: f64) -> (Option
     let mut of_log = |log: &ContactLog| {
         let mut seen = Cow::Borrowed(log);
         // The end is one of what the channel shows.
-        if let Some(ends) = change.ends_nm {
+        if let Some(ends) = &change.ends_nm {
             seen.to_mut().leave_out_ends(ends);
         }
         let Some(torque_nm) = behind(log) else { return DriveLog::of_contact(&seen, inertia) };
@@ -416,6 +416,7 @@ mod tests {
     use crate::files::log::Log;
     use crate::files::rig_file::RigFile;
     use crate::files::signal::Signal;
+    use crate::identify::contact::ends::Ends;
     use crate::identify::filters::{rms, shifted};
     use crate::identify::noise::White;
     use crate::identify::noise::tests::white;
@@ -521,7 +522,7 @@ mod tests {
         assert!(
             !drive_logs(&logs, &Change::default(), RigFile::assumed_rig(&[]).unwrap().m2_inertia_kg_m2).1
         );
-        let change = Change { mode: Some(MODE), ends_nm: Some((0.0, 2.5)), ..Change::default() };
+        let change = Change { mode: Some(MODE), ends_nm: Some(Ends::hard((0.0, 2.5))), ..Change::default() };
         let (Some(seen), true) =
             drive_logs(&logs, &change, RigFile::assumed_rig(&[]).unwrap().m2_inertia_kg_m2)
         else {

@@ -1,5 +1,6 @@
 //! What a hypothesis changes in the contact's balance, whatever effect asked for it.
 
+use super::ends::Ends;
 use super::law::Ageing;
 use super::problem::Numbers;
 use crate::identify::table::Part;
@@ -29,7 +30,7 @@ pub struct Change {
     /// Stiffness and damping in series with the slip, in place of the baseline's: N/m, N s/m.
     pub block: Option<(f64, f64)>,
     /// Ends of the friction channel, N m.
-    pub ends_nm: Option<(f64, f64)>,
+    pub ends_nm: Option<Ends>,
     /// Upper end of the normal channel and the width over which it bends there, N.
     pub normal_end_n: Option<(f64, f64)>,
     /// Way of the root in place of the logged one, m, per log and point.
@@ -37,9 +38,10 @@ pub struct Change {
 }
 
 impl Change {
-    /// Whether it changes what the friction channel shows of a torque, but for the ends of its range.
+    /// Whether it changes what the friction channel shows of a torque between the ends of its range.
     pub fn changes_friction_channel(&self) -> bool {
-        self.zero_nm.is_some() || self.gain.is_some() || self.late_s != 0.0 || self.mode.is_some()
+        let bends = self.ends_nm.is_some_and(|ends| ends.bend());
+        bends || self.zero_nm.is_some() || self.gain.is_some() || self.late_s != 0.0 || self.mode.is_some()
     }
 
     /// Adds `size` times a column to the logarithm of friction.

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use model_core::sensor::{LEAST_GAIN, SecondOrder, SecondOrderState, SensorChain, SensorUndo};
 
 use super::change::Change;
+use super::ends::Ends;
 use super::log::ContactLog;
 use super::problem::Numbers;
 use super::smoothing::OBSERVED_OVER;
@@ -67,7 +68,7 @@ pub(super) struct Channel<'a> {
     zero_nm: Option<&'a [f64]>,
     /// The same that never changes, N m.
     steady_zero_nm: f64,
-    ends_nm: Option<(f64, f64)>,
+    ends_nm: Option<Ends>,
 }
 
 impl<'a> Channel<'a> {
@@ -104,7 +105,8 @@ impl<'a> Channel<'a> {
         // The noise of a channel is no error of its lateness: it would be there twice, now and when it was late.
         let smooth_nm = adaptively_smoothed(&log.friction_nm, log.friction_noise_nm);
         let mut shown_nm = shifted(&smooth_nm, log.friction_late);
-        let delayed = self.before_delay(Cow::Owned(smooth_nm));
+        let bent = self.before_clip(Cow::Owned(smooth_nm));
+        let delayed = self.before_delay(bent);
         let acted = self.before_amplifier(delayed);
         let behind = self.ringing.and_then(|mode| before_ringing(&acted, mode, log.grid.step_s));
         let torque_nm = behind.map_or(acted, Cow::Owned);
@@ -116,8 +118,10 @@ impl<'a> Channel<'a> {
     pub(super) fn seen_nm(&mut self) -> Vec<f64> {
         let log = self.log;
         let seen = if self.ringing.is_none() && self.gain.is_none() && self.zero_nm.is_none() {
-            // The same, smoothed once for all hypotheses: smoothing commutes with a delay and with a steady zero.
-            let delayed = self.before_delay(Cow::Borrowed(&log.observed_nm));
+            // The same, smoothed once for all hypotheses: smoothing commutes with a delay and with a steady zero, and over so few
+            // samples a knee is straight.
+            let bent = self.before_clip(Cow::Borrowed(&log.observed_nm));
+            let delayed = self.before_delay(bent);
             self.before_amplifier(delayed)
         } else {
             self.undo(Cow::Borrowed(&log.friction_nm))
@@ -128,7 +132,9 @@ impl<'a> Channel<'a> {
     /// Where it is at an end of its range, so that the torque is at least (1) or at most (−1) what was seen; `None` where its
     /// range has no ends.
     pub(super) fn ends(&mut self, seen_nm: Vec<f64>) -> Option<Vec<i8>> {
-        let (low, high) = self.log.near_ends(self.ends_nm?);
+        let ends = self.ends_nm?;
+        let (low, high) = self.log.near_ends(&ends);
+        let (low, high) = (ends.acts(low), ends.acts(high));
         // The range ends behind the amplifier.
         let amplified = self.amplifier(Cow::Owned(seen_nm));
         Some(amplified.iter().map(|shown| i8::from(*shown > high) - i8::from(*shown < low)).collect())
@@ -171,13 +177,18 @@ impl<'a> SensorChain for Channel<'a> {
     }
 
     fn clip(&mut self, torque_nm: Self::Signal) -> Self::Signal {
-        let Some((low, high)) = self.ends_nm else { return torque_nm };
-        changed(torque_nm, |torque| torque.iter_mut().for_each(|t| *t = t.clamp(low, high)))
+        let Some(ends) = self.ends_nm else { return torque_nm };
+        changed(torque_nm, |torque| torque.iter_mut().for_each(|t| *t = ends.shown(*t)))
     }
 }
 
 impl<'a> SensorUndo for Channel<'a> {
     type Signal = Cow<'a, [f64]>;
+
+    fn before_clip(&mut self, shown_nm: Self::Signal) -> Self::Signal {
+        let Some(ends) = self.ends_nm.filter(Ends::bend) else { return shown_nm };
+        changed(shown_nm, |shown| shown.iter_mut().for_each(|s| *s = ends.acts(*s)))
+    }
 
     fn before_delay(&mut self, shown_nm: Self::Signal) -> Self::Signal {
         shifted(&shown_nm, self.late).into()
@@ -311,6 +322,40 @@ mod tests {
     }
 
     #[test]
+    fn a_knee_is_taken_back_as_far_as_it_tells_and_is_an_error_of_the_channel() {
+        let torque = |i: f64| 3.0 * (0.01 * i).sin();
+        let ends = Ends::with_knee((-2.6, 2.6), 0.2);
+        let log = log(series(|i| ends.shown(torque(i))));
+        let change = Change { ends_nm: Some(ends), ..Change::default() };
+        let mut channel = Channel::new(&log, 0, &change, &Numbers { friction_zero_nm: 0.0, ..numbers(0.0) });
+        assert!(off(&channel.shown_nm(series(torque)), &log.friction_nm) < 1e-12);
+        let seen_nm = channel.seen_nm();
+        let at_end = channel.ends(seen_nm.clone()).expect("it has ends");
+        let (low, high) = ends.told_between();
+        assert!(log.friction_nm.iter().any(|shown| *shown > high));
+        let told = |i: &usize| (50..COUNT - 50).contains(i) && (low..high).contains(&log.friction_nm[*i]);
+        for i in (0..COUNT).filter(told) {
+            assert!((seen_nm[i] - torque(i as f64)).abs() < 0.01, "{i}: {}", seen_nm[i]);
+        }
+        let error = &error_nm(std::slice::from_ref(&log), &change).expect("it has one")[0];
+        let (mut inside, mut beyond) = (0, 0);
+        for i in (0..COUNT).filter(|i| (50..COUNT - 50).contains(i)) {
+            let torque = torque(i as f64);
+            if at_end[i] == 0 {
+                inside += 1;
+                assert!((error[i] - (ends.shown(torque) - torque)).abs() < 0.01, "{i}: {}", error[i]);
+            } else {
+                beyond += 1;
+                assert!(f64::from(at_end[i]) * torque > 2.5, "{i}: {torque}");
+            }
+        }
+        assert!(inside > COUNT / 2 && beyond > COUNT / 10, "{inside} {beyond}");
+        // Ends without a knee take nothing from what is between them.
+        let cut = Change { ends_nm: Some(Ends::hard((-2.6, 2.6))), ..Change::default() };
+        assert!(error_nm(std::slice::from_ref(&log), &cut).is_none());
+    }
+
+    #[test]
     fn what_the_sensors_mode_rings_with_is_no_torque() {
         let torque = |i: f64| 3.0 * (0.01 * i).sin() + if i % 400.0 < 200.0 { 1.0 } else { 0.0 };
         let change = Change { mode: Some((40.0, 0.02)), ..Change::default() };
@@ -358,7 +403,7 @@ mod tests {
         let change = Change {
             zero_nm: Some(vec![series(|i| zero(i) - STEADY_NM)]),
             mode: Some((80.0, 0.01)),
-            ends_nm: Some((-5.0, 2.5)),
+            ends_nm: Some(Ends::hard((-5.0, 2.5))),
             ..Change::default()
         };
         let log = log(series(|i| 2.0 + zero(i)));

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::ends::Ends;
 use super::motion::{Motion, Speed};
 use super::observer::{SLIP_NOISES, slip_noise_m_s};
 use super::problem::Numbers;
@@ -207,13 +208,15 @@ impl ContactLog {
     }
 
     /// Values of the friction channel beyond which it is at an end of its range, N m.
-    pub fn near_ends(&self, (low, high): (f64, f64)) -> (f64, f64) {
+    pub fn near_ends(&self, ends: &Ends) -> (f64, f64) {
         let near = END_NOISES * self.friction_noise_nm;
-        (low + near, high - near)
+        let (low, high) = ends.told_between();
+        let (lowest, highest) = ends.range();
+        (low.max(lowest + near), high.min(highest - near))
     }
 
     /// Takes out the points at which the friction channel shows an end of its range, and what the amplifier smears.
-    pub fn leave_out_ends(&mut self, ends: (f64, f64)) {
+    pub fn leave_out_ends(&mut self, ends: &Ends) {
         let (low, high) = self.near_ends(ends);
         let ends = self.logged_nm.iter().map(|x| *x > high || *x < low).collect();
         self.leave_out(ends);

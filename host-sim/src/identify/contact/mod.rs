@@ -4,6 +4,7 @@ pub mod baseline;
 mod bristles;
 pub mod change;
 pub mod channel;
+pub mod ends;
 pub mod law;
 pub mod log;
 mod motion;

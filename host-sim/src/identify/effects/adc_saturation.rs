@@ -4,7 +4,8 @@ use model_core::extension::adc_saturation::AdcSaturation as Law;
 
 use super::{About, ContactView, Effect};
 use crate::identify::contact::change::ContactTerm;
-use crate::identify::contact::log::END_NOISES;
+use crate::identify::contact::ends::Ends;
+use crate::identify::contact::log::{ContactLog, END_NOISES};
 use crate::identify::filters::gaussian;
 use crate::identify::linear::{self, normal_equations};
 use crate::identify::term::{Parameter, Starts};
@@ -33,6 +34,14 @@ const KNEE_WITHIN: f64 = 1.5;
 /// Widest end, as a share of it: a soft limiter of order 5 (Rapp 1991) is 2 % off at four such widths below its end. One that is
 /// wider is no end, but M1's torque in place of a noisy bridge.
 const WIDEST: f64 = 0.03;
+
+/// ln of a bending end over the highest torque shown: one that is further off is not seen.
+const BEYOND_SHOWN: f64 = 0.2;
+/// Width of a knee over the end, and ln of what it is known within: an output stage leaves its straight range some tenth before its
+/// supply, sooner where nothing holds it straight. At a quarter the middle of the range is 2 % off, which a gain would be.
+const SOFT_KNEE: f64 = 0.1;
+const SOFT_KNEE_WITHIN: f64 = 0.7;
+const WIDEST_KNEE: f64 = 0.25;
 
 /// The end at which samples of a log pile up: more of them in the last band of values than in the next one below, thrice over,
 /// or more at all where another log ends at the same value: two courses have no reason to. No log goes beyond it; one that rests
@@ -82,7 +91,7 @@ impl Effect for AdcSaturation {
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
-        self.friction(view).into_iter().chain(self.normal(view)).collect()
+        self.friction(view).into_iter().chain([self.knee(view)]).chain(self.normal(view)).collect()
     }
 }
 
@@ -121,11 +130,40 @@ impl AdcSaturation {
         let term = ContactTerm::any(self.id(), parameters, Starts::At(vec![start]), move |p, change| {
             let end = |name: &str| names.iter().position(|n| *n == name).map(|at| p[at] * scale);
             let [low, high] = NAMES.map(end);
-            change.ends_nm = Some((low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)));
+            let range = (low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY));
+            change.ends_nm = Some(Ends::hard(range));
         });
         let export =
             move |p: &[f64]| shown.iter().zip(p).map(|(name, p)| (name.to_string(), p * scale)).collect();
         Some(ContactTerm { form, ..term }.exported(move |p, _| export(p)))
+    }
+
+    /// The friction channel bends before it ends: it never shows the end, and no more than a share of what it would.
+    fn knee(&self, view: &ContactView<'_>) -> ContactTerm {
+        let scale = view.scales.torque_nm;
+        let highest = |log: &ContactLog| {
+            let mut sizes: Vec<f64> = log.logged_nm.iter().map(|x| x.abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            top(&sizes).unwrap_or(0.0)
+        };
+        let least = view.logs.iter().map(highest).fold(0.0, f64::max) / scale;
+        let lower = if view.training { least.ln() } else { f64::NEG_INFINITY };
+        let parameters = vec![
+            Parameter { lower, reach: 0.1, ..Parameter::logarithm("ln_end", least, BEYOND_SHOWN) },
+            Parameter::logarithm("ln_knee_over_end", SOFT_KNEE, SOFT_KNEE_WITHIN),
+        ];
+        let starts = [(0.02, 0.05), (0.05, 0.1), (0.2, 0.2)].map(|(beyond, knee)| vec![least.ln() + beyond, f64::ln(knee)]);
+        let end_nm = move |p: &[f64]| scale * p[0].exp();
+        let knee_nm = move |p: &[f64]| end_nm(p) * p[1].exp().min(WIDEST_KNEE);
+        let term = ContactTerm::any(self.id(), parameters, Starts::At(starts.to_vec()), move |p, change| {
+            change.ends_nm = Some(Ends::with_knee((-end_nm(p), end_nm(p)), knee_nm(p)));
+        });
+        // Of the knee the core's law has nothing: it cuts where this ends.
+        let export = move |p: &[f64]| {
+            let named = [(NAMES[0], -end_nm(p)), (NAMES[1], end_nm(p)), ("friction_knee_nm", knee_nm(p))];
+            named.map(|(name, value)| (name.to_string(), value)).to_vec()
+        };
+        ContactTerm { form: "knee", ..term }.exported(move |p, _| export(p))
     }
 
     /// Where the normal channel is at its upper end, the load is what M1's torque makes it elsewhere.
@@ -191,7 +229,6 @@ mod tests {
     use crate::files::signal::Signal;
     use crate::identify::contact::baseline::{KNOWN_WITHIN, baseline};
     use crate::identify::contact::change::Change;
-    use crate::identify::contact::log::ContactLog;
     use crate::identify::noise::tests::white;
 
     const NOISE: f64 = 0.01;
@@ -216,12 +253,51 @@ mod tests {
         let term = AdcSaturation.of_ends(2.0, [None, Some(3.0)]).expect("one end");
         let mut change = Change::default();
         (term.act)(&[1.4], &mut change);
-        assert_eq!(change.ends_nm, Some((f64::NEG_INFINITY, 2.8)));
+        assert_eq!(change.ends_nm, Some(Ends::hard((f64::NEG_INFINITY, 2.8))));
         let export = term.export.as_ref().expect("a law of the core");
         let mut numbers = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).numbers;
         assert_eq!(export(&[1.4], &mut numbers), [(NAMES[1].to_string(), 2.8)]);
         let law = Law::new(&[AdcSaturation.absent(NAMES[0]), 2.8]).expect("allowed");
         assert_eq!([law.shown_nm(-1e6), law.shown_nm(1e6)], [-1e6, 2.8]);
+    }
+
+    #[test]
+    fn a_knee_ends_beyond_what_was_shown_and_cuts_there_in_the_core() {
+        let log = |amplitude_nm: f64| {
+            let mut log = Log::default();
+            log.set_signal(Signal::Time, (0..2000).map(|i| 1e-3 * f64::from(i)).collect());
+            log.set_signal(Signal::M2Speed, vec![5.0; 2000]);
+            log.set_signal(Signal::NormalForce, vec![70.0; 2000]);
+            let torque = |i: i32| amplitude_nm * (0.01 * f64::from(i)).sin();
+            log.set_signal(Signal::FrictionTorque, (0..2000).map(torque).collect());
+            ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()
+        };
+        let logs = [log(2.0), log(-3.0)];
+        let scales = Scales::new(&logs);
+        let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, &scales)).collect();
+        let view = ContactView {
+            logs: &logs,
+            coordinates: &coordinates,
+            scales: &scales,
+            training: true,
+            train_count: logs.len(),
+            block: true,
+        };
+        let term = AdcSaturation.knee(&view);
+        let lowest = [term.parameters[0].lower, -2.0];
+        let mut numbers = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).numbers;
+        let export = term.export.as_ref().expect("a law of the core");
+        let named = export(&lowest, &mut numbers);
+        assert!((named[1].1 - 3.0).abs() < 0.01 && named[0].1 == -named[1].1, "{named:?}");
+        assert!((named[2].1 / (named[1].1 * f64::exp(-2.0)) - 1.0).abs() < 1e-9, "{named:?}");
+        // A knee as wide as the range would be another gain.
+        let widest = export(&[lowest[0], 3.0], &mut numbers)[2].1;
+        assert!((widest / (WIDEST_KNEE * named[1].1) - 1.0).abs() < 1e-9, "{widest}");
+        // Of another log any end may be asked for, in the same unit.
+        let of_another = AdcSaturation.knee(&ContactView { training: false, ..view });
+        assert_eq!(of_another.parameters[0].lower, f64::NEG_INFINITY);
+        let other = of_another.export.as_ref().expect("a law of the core")(&lowest, &mut numbers);
+        assert_eq!(other, named);
     }
 
     #[test]
