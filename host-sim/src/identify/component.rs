@@ -113,7 +113,7 @@ impl Drawn {
                 values: in_nm(&without.r.iter().zip(&fit.r).map(|(a, b)| a - b).collect::<Vec<_>>()),
                 columns: columns[own.clone()].iter().map(|c| in_nm(c)).collect(),
                 covariance: block(covariance, &own),
-                coordinate: None,
+                coordinate: term.coordinate.clone(),
                 relative_to: (subsystem_of(term.effect) == Some(Subsystem::Friction))
                     .then(|| friction_nm.clone()),
             }
@@ -328,6 +328,24 @@ mod tests {
             let width = 0.5 * (band.y[bin] - band.y[2 * bins - 1 - bin]);
             assert!((width / (INTERVAL_95 * 0.05 * law.y[bin]) - 1.0).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_law_is_drawn_over_a_coordinate_of_its_own() {
+        let mut drawn = drawn(&|_, i| wander(i));
+        // By the time of each log and by the speed nothing is seen of it.
+        assert_eq!(drawn.law("bearing_stribeck").unwrap().x_title, TIME);
+        drawn.components[0].coordinate =
+            Some(("log after log, s".into(), (0..POINTS).map(|i| 1e-3 * i as f64).collect()));
+        let chart = drawn.law("bearing_stribeck").unwrap();
+        assert_eq!(chart.x_title, "log after log, s");
+        let law = &chart.panels[0].lines[1];
+        assert!(law.x.iter().zip(&law.y).all(|(x, y)| (y - wander((1e3 * x) as usize)).abs() < 0.05));
+    }
+
+    /// Half a turn over both logs: the second takes back what the first one does.
+    fn wander(i: usize) -> f64 {
+        (std::f64::consts::PI * i as f64 / POINTS as f64).cos()
     }
 
     #[test]

@@ -104,6 +104,8 @@ pub struct ContactTerm {
     pub law: bool,
     /// The bridge that does the same within its class, where all that it does is an error of one.
     pub error_of: Option<Bridge>,
+    /// What it is drawn over where it has a coordinate of its own: name with unit, all logs on end.
+    pub coordinate: Option<(String, Vec<f64>)>,
     /// What it changes.
     pub act: Act,
     /// The core's parameters for fitted values; may change the baseline's numbers. `None` where the form is no law.
@@ -134,6 +136,7 @@ impl ContactTerm {
             columns: Some(Columns::LogFactor(columns)),
             law: false,
             error_of: None,
+            coordinate: None,
             export: None,
             act: Box::new(move |sizes, change| change.add_log_factor(&shared, sizes)),
         }
@@ -156,6 +159,7 @@ impl ContactTerm {
             columns: None,
             law: false,
             error_of: None,
+            coordinate: None,
             export: None,
             act: Box::new(move |sizes, change| {
                 let (zeros, gains) = sizes.split_at(zero_nm.len());
@@ -183,6 +187,13 @@ impl ContactTerm {
         export: impl Fn(&[f64], &mut Numbers) -> Vec<(String, f64)> + Send + Sync + 'static,
     ) -> Self {
         self.export = Some(Box::new(export));
+        self
+    }
+
+    /// Drawn over this, name with unit, all logs on end.
+    #[must_use]
+    pub fn over(mut self, name: &str, values: Vec<f64>) -> Self {
+        self.coordinate = Some((name.into(), values));
         self
     }
 
@@ -234,6 +245,7 @@ impl ContactTerm {
             columns: None,
             law: false,
             error_of: None,
+            coordinate: None,
             act: Box::new(act),
             export: None,
         }

@@ -163,7 +163,9 @@ impl AdcSaturation {
             let named = [(NAMES[0], -end_nm(p)), (NAMES[1], end_nm(p)), ("friction_knee_nm", knee_nm(p))];
             named.map(|(name, value)| (name.to_string(), value)).to_vec()
         };
-        ContactTerm { form: "knee", ..term }.exported(move |p, _| export(p))
+        let shown_nm = view.logs.iter().flat_map(|log| log.observed_nm.iter().copied()).collect();
+        let term = ContactTerm { form: "knee", ..term }.over("friction torque as shown, N m", shown_nm);
+        term.exported(move |p, _| export(p))
     }
 
     /// Where the normal channel is at its upper end, the load is what M1's torque makes it elsewhere.
@@ -284,6 +286,9 @@ mod tests {
             block: true,
         };
         let term = AdcSaturation.knee(&view);
+        // The picture of a knee is over what the channel shows.
+        let (over, values) = term.coordinate.as_ref().expect("one of its own");
+        assert!(over.contains("friction torque") && values.len() == logs[0].len() + logs[1].len(), "{over}");
         let lowest = [term.parameters[0].lower, -2.0];
         let mut numbers = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).numbers;
         let export = term.export.as_ref().expect("a law of the core");

@@ -118,6 +118,18 @@ fn in_log_alone(mut column: Column, log: Option<usize>) -> Column {
     column
 }
 
+/// Time, s, as if each log began where the one before it ends.
+fn log_after_log<'t>(logs: impl Iterator<Item = &'t [f64]>) -> Vec<f64> {
+    let mut begins = 0.0;
+    let mut all = Vec::new();
+    for time_s in logs {
+        let first = time_s.first().copied().unwrap_or(0.0);
+        all.extend(time_s.iter().map(|t| begins + t - first));
+        begins = all.last().copied().unwrap_or(begins);
+    }
+    all
+}
+
 /// The core's drift, which has one settling time: least squares on the sum of the columns over the log.
 fn export(course: Course, p: &[f64], bridge: &str, time_s: f64, zero: f64) -> Vec<(String, f64)> {
     const POINTS: usize = 100;
@@ -217,7 +229,8 @@ impl Effect for BridgeDrift {
                 .as_error_of(Bridge::Friction),
             ContactTerm::factor(self.id(), "normal wanders in each log", normal, walk("normal")).as_error_of(Bridge::Normal),
         ];
-        forms.chain(apart).collect()
+        let log_after_log = log_after_log(view.logs.iter().map(|log| log.grid.time_s.as_slice()));
+        forms.chain(apart.map(|term| term.over("time, log after log, s", log_after_log.clone()))).collect()
     }
 
     fn drive(&self, view: &DriveView<'_>) -> Vec<Alternative> {
@@ -344,6 +357,13 @@ mod tests {
         assert_eq!(in_log_alone(column, None), [vec![0.0], vec![0.0; 2]]);
         // A sine stands for no more than the walk's way back.
         assert_eq!((parameters[7].sd, parameters[8].sd < 2.0), (3.0, true));
+    }
+
+    #[test]
+    fn logs_follow_each_other_in_time_whenever_they_were_taken() {
+        let logs = [vec![5.0, 5.5, 6.0], Vec::new(), vec![0.0, 0.25]];
+        let time_s = log_after_log(logs.iter().map(Vec::as_slice));
+        assert_eq!(time_s, [0.0, 0.5, 1.0, 1.0, 1.25]);
     }
 
     #[test]
