@@ -223,40 +223,45 @@ fn the_band_brake_holds_by_direction_and_by_load() {
     diagnosis.cause("load_dependence");
 }
 
-#[test]
-#[ignore = "two minutes: ten strokes at three loads"]
-fn the_o_ring_drags_in_an_affine_law_of_its_load() {
-    let mut bench = Bench::new();
-    for name in ["oring_1bar.csv", "oring_3bar.csv", "oring_7bar.csv"] {
-        let Some(table) = Table::measured(name) else { return };
-        // The pressure on 1 cm² loads the seal: 10, 30, 70 N.
-        let normal = table.column("pressure_pa").iter().map(|pressure| pressure * 1e-4).collect();
-        let columns = [
-            ("time_s", table.time().to_vec()),
-            ("m2_angle_rad", table.column("position_m").to_vec()),
-            ("m2_speed_rad_s", table.column("speed_m_s").to_vec()),
-            ("normal_force_n", normal),
-            ("friction_torque_nm", table.column("friction_force_n").to_vec()),
-        ];
-        // The last quarter of the strokes is held out; logging paused between some of them.
-        let pieces = table.pieces(0.05, 5.0);
-        let end = table.time().len();
-        for piece in pieces {
-            let cut = (3 * end / 4).clamp(piece.start, piece.end);
-            for (rows, holdout) in [(piece.start..cut, false), (cut..piece.end, true)] {
-                if rows.len() >= 500 {
-                    bench.log(holdout, rows, &columns);
+/// Ten strokes at three loads: `cargo verify` runs it, and `cargo test long:: -- --ignored`.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo verify runs it"]
+    fn the_o_ring_drags_in_an_affine_law_of_its_load() {
+        let mut bench = Bench::new();
+        for name in ["oring_1bar.csv", "oring_3bar.csv", "oring_7bar.csv"] {
+            let Some(table) = Table::measured(name) else { return };
+            // The pressure on 1 cm² loads the seal: 10, 30, 70 N.
+            let normal = table.column("pressure_pa").iter().map(|pressure| pressure * 1e-4).collect();
+            let columns = [
+                ("time_s", table.time().to_vec()),
+                ("m2_angle_rad", table.column("position_m").to_vec()),
+                ("m2_speed_rad_s", table.column("speed_m_s").to_vec()),
+                ("normal_force_n", normal),
+                ("friction_torque_nm", table.column("friction_force_n").to_vec()),
+            ];
+            // The last quarter of the strokes is held out; logging paused between some of them.
+            let pieces = table.pieces(0.05, 5.0);
+            let end = table.time().len();
+            for piece in pieces {
+                let cut = (3 * end / 4).clamp(piece.start, piece.end);
+                for (rows, holdout) in [(piece.start..cut, false), (cut..piece.end, true)] {
+                    if rows.len() >= 500 {
+                        bench.log(holdout, rows, &columns);
+                    }
                 }
             }
         }
+        let model = "kind = \"lugre\"\n[parameters]\nsigma0_n_per_m = 2e4\nsigma1_n_s_per_m = 0.0\na0 = 0.15\na1 = 0.05\n\
+                     a2_s_per_m = 0.0\nv0_m_s = 0.005\ndelta = 1.0\ntheta = 1.0\n";
+        let diagnosis = bench.diagnose(Some(bench.contact_files(model)));
+        let cause = diagnosis.cause("load_dependence");
+        // Affine: a force that is there without load. The published half loops lie on 3.4 N and 0.066 N per N.
+        let said = cause.to_string();
+        let line = said.split("affine law ").nth(1).unwrap_or_else(|| panic!("{cause:#}"));
+        let numbers: Vec<f64> = line.split(' ').filter_map(|word| word.parse().ok()).take(2).collect();
+        assert!((2.5..4.5).contains(&numbers[0]) && (0.05..0.08).contains(&numbers[1]), "{line}");
     }
-    let model = "kind = \"lugre\"\n[parameters]\nsigma0_n_per_m = 2e4\nsigma1_n_s_per_m = 0.0\na0 = 0.15\na1 = 0.05\n\
-                 a2_s_per_m = 0.0\nv0_m_s = 0.005\ndelta = 1.0\ntheta = 1.0\n";
-    let diagnosis = bench.diagnose(Some(bench.contact_files(model)));
-    let cause = diagnosis.cause("load_dependence");
-    // Affine: a force that is there without load. The published half loops lie on 3.4 N and 0.066 N per N.
-    let said = cause.to_string();
-    let line = said.split("affine law ").nth(1).unwrap_or_else(|| panic!("{cause:#}"));
-    let numbers: Vec<f64> = line.split(' ').filter_map(|word| word.parse().ok()).take(2).collect();
-    assert!((2.5..4.5).contains(&numbers[0]) && (0.05..0.08).contains(&numbers[1]), "{line}");
 }

@@ -46,7 +46,7 @@ impl Ends {
         acts + beyond(self.low - acts) - beyond(acts - self.high)
     }
 
-    /// What is shown where the channel follows by [`LEAST_SLOPE`], on either side.
+    /// What is shown where the channel follows by a fifth, on either side.
     pub fn told_between(&self) -> (f64, f64) {
         let near = -self.knee * (1.0 - LEAST_SLOPE).ln();
         (self.low + near, self.high - near)
