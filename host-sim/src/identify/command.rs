@@ -75,9 +75,12 @@ pub fn diagnose(
             if contact.disc_cause.is_none() {
                 extended = extended.fitted(model, rig, train, &|| ());
             }
+            let text = extended.model.to_toml()
+                + &extended_model::remarks_of_contact(&extended.model, &extended.values)
+                + &extended_model::remarks(&judgement);
             values.extend(extended.values);
             drawn.insert(0, Drawn::of_contact(contact, &extended.laws));
-            extended.model.to_toml() + &extended_model::remarks(&judgement)
+            text
         }
         None => extended_model::drive_text(&judgement),
     };

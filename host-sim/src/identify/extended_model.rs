@@ -273,6 +273,22 @@ pub fn drive_text(found: &Judgement) -> String {
     text
 }
 
+/// Numbers of the contact's effects that its file does not have, as comments of it.
+pub fn remarks_of_contact(model: &ModelFile, values: &Values) -> String {
+    let mut text = String::new();
+    for (id, values) in values {
+        let own = model.extensions.iter().find(|extension| extension.id == *id);
+        let has = |name: &str| own.is_some_and(|own| own.parameters.iter().any(|(other, _)| other == name));
+        let missing = |(name, _): &(&String, &Value)| !has(name) && model.get(name).is_none();
+        let missing: Vec<(&String, &Value)> = values.iter().filter(missing).collect();
+        if !missing.is_empty() {
+            text += &format!("\n# {id}: the observer on the chip has no law for this of it:\n");
+            missing.iter().for_each(|(name, v)| text += &format!("# {}", line(name, v.value)));
+        }
+    }
+    text
+}
+
 /// What was found outside the contact, as comments of its file.
 pub fn remarks(found: &Judgement) -> String {
     let mut text = String::new();
@@ -305,6 +321,29 @@ mod tests {
         });
         assert_eq!((brush.kind, brush.get("k_u_n_per_m")), (ModelKind::Series, Some(2e4)));
         assert_eq!(brush.to_toml(), lugre.to_toml());
+    }
+
+    #[test]
+    fn what_the_file_lacks_of_an_effect_is_a_comment_of_it() {
+        let text = "kind = \"brush\"\n[parameters]\nc_n_per_m = 3e4\nmu_s = 1.0\nmu_c = 0.5\n\n[[extension]]\n\
+                    id = \"adc_saturation\"\nfriction_low_nm = -3.0\nfriction_high_nm = 3.0\n";
+        let model = ModelFile::parse("model.toml", text).unwrap();
+        let value = |name: &str, value| (name.to_string(), Value { value, std: None });
+        let clips = [value("friction_low_nm", -3.0), value("friction_high_nm", 3.0)];
+        // In the numbers of the model.
+        let stiffer = [value("c_n_per_m", 3e4)];
+        let remarks = |clips: &[(String, Value)]| {
+            let values =
+                [("adc_saturation", clips.iter().cloned().collect()), ("stiffer", stiffer.clone().into())];
+            remarks_of_contact(&model, &values.into())
+        };
+        assert_eq!(remarks(&clips), "");
+        let said = remarks(&[&clips[..], &[value("friction_knee_nm", 0.25)]].concat());
+        assert!(
+            said.contains("# adc_saturation: ") && said.ends_with(":\n# friction_knee_nm = 0.25\n"),
+            "{said}"
+        );
+        assert_eq!(ModelFile::parse("model.toml", &(text.to_string() + &said)).unwrap(), model);
     }
 
     #[test]
