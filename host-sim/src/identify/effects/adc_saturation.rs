@@ -241,6 +241,14 @@ mod tests {
         white(20_000, 4).iter().enumerate().map(clipped).collect()
     }
 
+    /// What is made of these logs.
+    fn with_view<T>(logs: &[ContactLog], training: bool, make: impl FnOnce(&ContactView<'_>) -> T) -> T {
+        let scales = Scales::new(logs);
+        let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, &scales)).collect();
+        let (coordinates, scales, train_count) = (coordinates.as_slice(), &scales, logs.len());
+        make(&ContactView { logs, coordinates, scales, training, train_count, block: true })
+    }
+
     #[test]
     fn a_log_that_rests_just_below_the_end_does_not_hide_it() {
         let rests: Vec<f64> = white(20_000, 5).iter().map(|e| 2.92 + NOISE * e).collect();
@@ -275,17 +283,7 @@ mod tests {
             ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()
         };
         let logs = [log(2.0), log(-3.0)];
-        let scales = Scales::new(&logs);
-        let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, &scales)).collect();
-        let view = ContactView {
-            logs: &logs,
-            coordinates: &coordinates,
-            scales: &scales,
-            training: true,
-            train_count: logs.len(),
-            block: true,
-        };
-        let term = AdcSaturation.knee(&view);
+        let [term, of_another] = [true, false].map(|training| with_view(&logs, training, |view| AdcSaturation.knee(view)));
         // The picture of a knee is over what the channel shows.
         let (over, values) = term.coordinate.as_ref().expect("one of its own");
         assert!(over.contains("friction torque") && values.len() == logs[0].len() + logs[1].len(), "{over}");
@@ -299,7 +297,6 @@ mod tests {
         let widest = export(&[lowest[0], 3.0], &mut numbers)[2].1;
         assert!((widest / (WIDEST_KNEE * named[1].1) - 1.0).abs() < 1e-9, "{widest}");
         // Of another log any end may be asked for, in the same unit.
-        let of_another = AdcSaturation.knee(&ContactView { training: false, ..view });
         assert_eq!(of_another.parameters[0].lower, f64::NEG_INFINITY);
         let other = of_another.export.as_ref().expect("a law of the core")(&lowest, &mut numbers);
         assert_eq!(other, named);
@@ -321,17 +318,7 @@ mod tests {
             ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()
         };
         let logs = [log(0.0), log(1.0)];
-        let scales = Scales::new(&logs);
-        let coordinates: Vec<Coordinates> = logs.iter().map(|log| Coordinates::new(log, &scales)).collect();
-        let view = ContactView {
-            logs: &logs,
-            coordinates: &coordinates,
-            scales: &scales,
-            training: true,
-            train_count: logs.len(),
-            block: true,
-        };
-        let term = AdcSaturation.normal(&view).expect("an end");
+        let term = with_view(&logs, true, |view| AdcSaturation.normal(view)).expect("an end");
         let Starts::At(starts) = &term.starts else { panic!("one start") };
         let mut wide = starts[0].clone();
         wide[3] = 0f64;
