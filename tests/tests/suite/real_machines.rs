@@ -51,6 +51,18 @@ impl Table {
         self.column("time_s")
     }
 
+    /// The columns of a contact log of a linear machine that is pressed with this force.
+    fn contact_columns(&self, normal_n: Vec<f64>) -> [(&'static str, Vec<f64>); 5] {
+        let measured = |name: &str| self.column(name).to_vec();
+        [
+            ("time_s", self.time().to_vec()),
+            ("m2_angle_rad", measured("position_m")),
+            ("m2_speed_rad_s", measured("speed_m_s")),
+            ("normal_force_n", normal_n),
+            ("friction_torque_nm", measured("friction_force_n")),
+        ]
+    }
+
     /// Rows from one time to another.
     fn rows_between(&self, from_s: f64, to_s: f64) -> std::ops::Range<usize> {
         let at = |time: f64| self.time().partition_point(|t| *t < time);
@@ -206,13 +218,7 @@ fn the_band_brake_holds_by_direction_and_by_load() {
         let (one, other) = (table.column("band_force_1_n"), table.column("band_force_2_n"));
         // Both ends of the band press; their gauges read a little below zero when slack.
         let normal = one.iter().zip(other).map(|(a, b)| (a + b).max(0.0)).collect();
-        let columns = [
-            ("time_s", table.time().to_vec()),
-            ("m2_angle_rad", table.column("position_m").to_vec()),
-            ("m2_speed_rad_s", table.column("speed_m_s").to_vec()),
-            ("normal_force_n", normal),
-            ("friction_torque_nm", table.column("friction_force_n").to_vec()),
-        ];
+        let columns = table.contact_columns(normal);
         bench.log(holdout, 0..table.time().len(), &columns);
     }
     // What a user would start from: 10 kN at 4.5 kN of band force, held over a millimetre.
@@ -235,13 +241,7 @@ mod long {
             let Some(table) = Table::measured(name) else { return };
             // The pressure on 1 cm² loads the seal: 10, 30, 70 N.
             let normal = table.column("pressure_pa").iter().map(|pressure| pressure * 1e-4).collect();
-            let columns = [
-                ("time_s", table.time().to_vec()),
-                ("m2_angle_rad", table.column("position_m").to_vec()),
-                ("m2_speed_rad_s", table.column("speed_m_s").to_vec()),
-                ("normal_force_n", normal),
-                ("friction_torque_nm", table.column("friction_force_n").to_vec()),
-            ];
+            let columns = table.contact_columns(normal);
             // The last quarter of the strokes is held out; logging paused between some of them.
             let pieces = table.pieces(0.05, 5.0);
             let end = table.time().len();
