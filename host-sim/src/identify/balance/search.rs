@@ -10,6 +10,8 @@ use crate::identify::contact::search::WORTH;
 
 /// Shapes of a combination of effects that are solved, of those that a glance ranks.
 const SHAPES: usize = 2;
+/// Combinations from which a larger one is looked for.
+const PARENTS: usize = 3;
 
 /// What proposes forms: of the effects that are wanted, for what these forms leave.
 pub type Propose<'p> =
@@ -91,14 +93,21 @@ fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize)
                 let forms = chosen(&set);
                 balance.glance(set, &forms, &parent.innovations)
             };
-            let glances: Vec<Glance> =
-                with_one_more(alternatives, &parents).into_par_iter().map(glance).collect();
-            let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), SHAPES);
             let refit =
                 |near: &Glance| balance.solve_white(&near.set, &chosen(&near.set), Some(&near.innovations));
-            let refitted: Vec<Solved> = best.par_iter().map(refit).collect();
-            let solved = best_shapes(alternatives, refitted, |s| (&s.set, s.log_evidence), 1);
-            parents = solved.iter().take(3).cloned().collect();
+            let solved = |sets: Vec<(Vec<usize>, &Solved)>, shapes: usize| -> Vec<Solved> {
+                let glances: Vec<Glance> = sets.into_par_iter().map(glance).collect();
+                let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), shapes);
+                best.par_iter().map(refit).collect()
+            };
+            let evidence = |s: &Solved| s.log_evidence;
+            let larger = solved(with_one_more(alternatives, &parents), SHAPES);
+            let mut larger = best_shapes(alternatives, larger, |s| (&s.set, evidence(s)), 1);
+            let leading = &larger[..larger.len().min(PARENTS)];
+            let exchanged = solved(with_another_form(alternatives, leading), 1);
+            larger.extend(exchanged);
+            let solved = best_shapes(alternatives, larger, |s| (&s.set, evidence(s)), 1);
+            parents = solved.iter().take(PARENTS).cloned().collect();
             let best =
                 |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
             let worth = best(&solved) > best(&found);
@@ -137,6 +146,27 @@ fn with_one_more<'p>(alternatives: &[Alternative], parents: &'p [Solved]) -> Vec
         }
     }
     sets
+}
+
+/// Each of these sets with one of its forms exchanged for another of the same effect: the shape that was best alone need not be so
+/// beside the others.
+fn with_another_form<'p>(alternatives: &[Alternative], sets: &'p [Solved]) -> Vec<(Vec<usize>, &'p Solved)> {
+    let mut out = Vec::new();
+    for solved in sets.iter().filter(|solved| solved.set.len() > 1) {
+        for own in &solved.set {
+            let rest = || solved.set.iter().copied().filter(|other| other != own);
+            let coupled = rest().any(|other| alternatives[other].is_coupling());
+            for (place, form) in alternatives.iter().enumerate() {
+                let fits = !(coupled && form.is_coupling());
+                if place != *own && form.effect == alternatives[*own].effect && fits {
+                    let mut set: Vec<usize> = rest().chain([place]).collect();
+                    set.sort_unstable();
+                    out.push((set, solved));
+                }
+            }
+        }
+    }
+    out
 }
 
 /// The best of these, each a set with its evidence, at most so many of each combination of effects, the best first.
@@ -186,6 +216,35 @@ mod tests {
         let best: Vec<&str> = found[0].set.iter().map(|a| alternatives[*a].effect).collect();
         assert_eq!(best.len(), 2, "{best:?}");
         assert!((found[0].p[2] - 3.0).abs() < 0.2, "{:?}", found[0].p);
+    }
+
+    #[test]
+    fn a_form_that_was_best_alone_gives_way_to_the_one_that_is_best_beside_another() {
+        let half = |i: usize| if i < ROWS / 2 { 1.0 } else { -1.0 };
+        let wave = |i: usize| (0.2 * i as f64).sin();
+        let column = |of: &dyn Fn(usize) -> f64| (0..ROWS).map(of).collect::<Vec<f64>>();
+        // A part of the second cause is a wave with another sign in each half, which a wave for each half takes.
+        let second = |i: usize| half(i) * (wave(i) + (0.5 * i as f64).cos());
+        let noise = white(ROWS, 2);
+        let mut balance = balance(column(&|i| 9.0 * wave(i) + 3.0 * second(i) + noise[i]));
+        let form = |effect, columns: Vec<Vec<f64>>| {
+            let size = |i: usize| Parameter::amplitude(format!("size_{i}"), 30.0);
+            Alternative::columns(effect, (0..columns.len()).map(size).collect(), columns)
+        };
+        let of_half = |sign: f64| column(&|i| if half(i) == sign { wave(i) } else { 0.0 });
+        let forms = [
+            form("first", vec![of_half(1.0), of_half(-1.0)]),
+            form("first", vec![column(&wave)]),
+            form("second", vec![column(&second)]),
+            // Alone each is more like what is seen than the second cause.
+            form("like_the_first", vec![column(&|i| wave(i) + 0.1 * (0.31 * i as f64).sin())]),
+            form("as_like_it", vec![column(&|i| wave(i) + 0.1 * (0.43 * i as f64).sin())]),
+        ];
+        let found = search_sets(&mut balance, &forms, 2);
+        let alone =
+            found.iter().find(|solved| solved.set.len() == 1 && forms[solved.set[0]].effect == "first");
+        assert_eq!(alone.unwrap().set, [0]);
+        assert_eq!(found[0].set, [1, 2]);
     }
 
     #[test]
