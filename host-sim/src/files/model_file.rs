@@ -281,8 +281,12 @@ fn read_extension(table: &TableReader<'_>) -> Result<Extension, InputError> {
     match CoreExtension::with_id(id) {
         // An effect on the friction channel: the core says which parameters it has and checks them.
         Some(effect) => {
-            let values = effect.names().iter().map(|name| table.required_number(name, FINITE));
-            let values: Vec<f64> = values.collect::<Result<_, _>>()?;
+            let required = effect.names().len() - effect.optional().len();
+            let value = |(at, name): (usize, &&'static str)| match at.checked_sub(required) {
+                None => table.required_number(name, FINITE),
+                Some(at) => Ok(table.number(name, FINITE)?.unwrap_or(effect.optional()[at])),
+            };
+            let values: Vec<f64> = effect.names().iter().enumerate().map(value).collect::<Result<_, _>>()?;
             table.finish()?;
             let checked = Extensions::none(SOME_STEP_S).set(effect, &values);
             checked.map_err(|e| table.error(e.name, "out of range").allowed(e.allowed))?;

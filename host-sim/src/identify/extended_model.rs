@@ -326,7 +326,7 @@ mod tests {
     #[test]
     fn what_the_file_lacks_of_an_effect_is_a_comment_of_it() {
         let text = "kind = \"brush\"\n[parameters]\nc_n_per_m = 3e4\nmu_s = 1.0\nmu_c = 0.5\n\n[[extension]]\n\
-                    id = \"adc_saturation\"\nfriction_low_nm = -3.0\nfriction_high_nm = 3.0\n";
+                    id = \"adc_saturation\"\nfriction_low_nm = -3.0\nfriction_high_nm = 3.0\nfriction_knee_nm = 0.1\n";
         let model = ModelFile::parse("model.toml", text).unwrap();
         let value = |name: &str, value| (name.to_string(), Value { value, std: None });
         let clips = [value("friction_low_nm", -3.0), value("friction_high_nm", 3.0)];
@@ -338,9 +338,9 @@ mod tests {
             remarks_of_contact(&model, &values.into())
         };
         assert_eq!(remarks(&clips), "");
-        let said = remarks(&[&clips[..], &[value("friction_knee_nm", 0.25)]].concat());
+        let said = remarks(&[&clips[..], &[value("normal_high_n", 90.0)]].concat());
         assert!(
-            said.contains("# adc_saturation: ") && said.ends_with(":\n# friction_knee_nm = 0.25\n"),
+            said.contains("# adc_saturation: ") && said.ends_with(":\n# normal_high_n = 90.0\n"),
             "{said}"
         );
         assert_eq!(ModelFile::parse("model.toml", &(text.to_string() + &said)).unwrap(), model);

@@ -46,8 +46,8 @@ pub(super) fn simulate(
         let values: Vec<f64> = extension.parameters.iter().map(|(_, value)| *value).collect();
         match (effect, values.as_slice()) {
             (Extension::FrictionDelay, [delay_s]) => samples.delay_s += delay_s,
-            (Extension::AdcSaturation, [low, high]) => {
-                samples.clipping = Some(AdcSaturation::new(&[*low, *high])?);
+            (Extension::AdcSaturation, [low, high, knee]) => {
+                samples.clipping = Some(AdcSaturation::new(&[*low, *high, *knee])?);
             }
             _ => effects.set(effect, &values)?,
         }
@@ -149,6 +149,9 @@ mod tests {
         let low = torque(
             "[[extension]]\nid = \"adc_saturation\"\nfriction_low_nm = -1.0\nfriction_high_nm = 3.5\n",
         );
+        let knee = torque(
+            "[[extension]]\nid = \"adc_saturation\"\nfriction_low_nm = -1.0\nfriction_high_nm = 3.5\nfriction_knee_nm = 0.1\n",
+        );
         let inputs = inputs();
         for i in 100..plain.len() {
             // The film passes ring and amplifier, which delay 7 rad/s by 0.24 ms: 1e-4 of 0.12 N·m and less.
@@ -156,6 +159,9 @@ mod tests {
             assert!((film[i] - expected).abs() < 1e-3, "{i}: {} {expected}", film[i]);
             assert!((late[i] - plain[i - 5]).abs() < 1e-9, "{i}");
             assert!((low[i] - plain[i].clamp(-1.0, 3.5)).abs() < 1e-9, "{i}");
+            // A knee shows less, most at the end itself.
+            let less = 0.1 * (-(plain[i] - 3.5).abs() / 0.1).exp().ln_1p();
+            assert!((low[i] - knee[i] - less).abs() < 1e-9, "{i}: {} {}", plain[i], knee[i]);
         }
         assert!(plain.iter().any(|torque_nm| *torque_nm > 3.6), "the clipping would not matter");
     }

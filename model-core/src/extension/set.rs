@@ -22,7 +22,7 @@ use crate::real::Real;
 pub const MOST_VALUES: usize = 21;
 
 macro_rules! effects {
-    ($($variant:ident, $field:ident, $type:ident, $id:literal, [$($step:ident)?];)*) => {
+    ($($variant:ident, $field:ident, $type:ident, $id:literal, [$($step:ident)?] $(, $optional:expr)?;)*) => {
         /// An effect of the library that extends the friction model.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Extension {
@@ -42,6 +42,12 @@ macro_rules! effects {
             pub const fn names(self) -> &'static [&'static str] {
                 match self { $(Self::$variant => $type::<f32>::NAMES,)* }
             }
+
+            /// Values of its last parameters where they are not given.
+            pub const fn optional(self) -> &'static [f64] {
+                const NONE: &[f64] = &[];
+                match self { $(Self::$variant => [$($optional,)? NONE][0],)* }
+            }
         }
 
         /// The effects of an extended model.
@@ -57,8 +63,8 @@ macro_rules! effects {
                 Self { $($field: None,)* step_s }
             }
 
-            /// Adds an effect, or replaces it. A wrong number of values is refused like a value out of
-            /// range.
+            /// Adds an effect, or replaces it; optional values may be left out. A wrong number of values is refused like a value
+            /// out of range.
             pub fn set(&mut self, extension: Extension, values: &[T]) -> Result<(), ParameterError> {
                 let wrong_count = ParameterError {
                     name: extension.id(),
@@ -69,8 +75,8 @@ macro_rules! effects {
                 let step_s = self.step_s;
                 match extension {
                     $(Extension::$variant => {
-                        let values = values.try_into().map_err(|_| wrong_count)?;
-                        self.$field = Some($type::new(values $(, { let $step = step_s; $step })?)?);
+                        let values = with_optional(values, extension.optional()).ok_or(wrong_count)?;
+                        self.$field = Some($type::new(&values $(, { let $step = step_s; $step })?)?);
                     })*
                 }
                 Ok(())
@@ -99,7 +105,19 @@ effects! {
     FrictionDelay, friction_delay, FrictionDelay, "friction_delay", [step_s];
     RingResonance, ring_resonance, RingResonance, "ring_resonance", [step_s];
     EncoderEccentricity, encoder_eccentricity, EncoderEccentricity, "encoder_eccentricity", [];
-    AdcSaturation, adc_saturation, AdcSaturation, "adc_saturation", [];
+    AdcSaturation, adc_saturation, AdcSaturation, "adc_saturation", [], AdcSaturation::<f32>::OPTIONAL;
+}
+
+/// All values of an effect, of which the last ones may not be given; `None` where others are missing, or there are too many.
+fn with_optional<T: Real, const COUNT: usize>(values: &[T], optional: &[f64]) -> Option<[T; COUNT]> {
+    let from = COUNT.checked_sub(optional.len())?;
+    let is_whole = (from..=COUNT).contains(&values.len());
+    let value = |i: usize| {
+        let absent = || optional.get(i.wrapping_sub(from)).map(|value| T::from_f64(*value));
+        values.get(i).copied().or_else(absent)
+    };
+    let all = core::array::from_fn(|i| value(i).unwrap_or(T::from_f64(0.0)));
+    is_whole.then_some(all)
 }
 
 impl<T: Real> Extensions<T> {
@@ -142,6 +160,13 @@ mod tests {
         }
         set.set(Extension::ViscousFilm, &[3.0]).unwrap();
         assert!(set.has(Extension::ViscousFilm) && !set.has(Extension::WearDrift));
+        // An older record of the channel's ends has no knee.
+        for (values, whole) in [(&[-2.0, 2.0][..], true), (&[-2.0, 2.0, 0.1], true), (&[-2.0], false)] {
+            assert_eq!(set.set(Extension::AdcSaturation, values).is_ok(), whole, "{values:?}");
+        }
+        assert!(set.set(Extension::AdcSaturation, &[-2.0, 2.0, 0.1, 0.0]).is_err());
+        set.set(Extension::AdcSaturation, &[-2.0, 2.0]).unwrap();
+        assert_eq!(set.adc_saturation.unwrap().shown_nm(9.0), 2.0);
         let error = set.set(Extension::ViscousFilm, &[-3.0]).unwrap_err();
         assert_eq!((error.name, error.value), ("coefficient_n_s_per_m", -3.0));
     }

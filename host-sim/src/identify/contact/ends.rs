@@ -1,8 +1,9 @@
 //! Ends of a channel's range, hard or with a knee.
 //!
-//! y = u + k ln(1 + e^((low − u)/k)) − k ln(1 + e^((u − high)/k)): between the ends y is u, beyond them it stays there, and its
-//! slope falls from one to nothing within some k of an end, as a logistic curve does; without a knee it cuts. The way back is
-//! taken up to where y follows u by a fifth: from there on noise is all that it would show.
+//! What is shown is the core's law, [`AdcSaturation`]. The way back is taken up to where the channel follows by a fifth: from
+//! there on noise is all that it would show.
+
+use model_core::extension::adc_saturation::AdcSaturation;
 
 /// The smallest slope of the channel that is worth a way back.
 const LEAST_SLOPE: f64 = 0.2;
@@ -38,12 +39,7 @@ impl Ends {
 
     /// What is shown of a value.
     pub fn shown(&self, acts: f64) -> f64 {
-        if !self.bend() {
-            return acts.max(self.low).min(self.high);
-        }
-        // What is beyond an end, softly: for a large excess that itself.
-        let beyond = |excess: f64| excess.max(0.0) + self.knee * (-(excess / self.knee).abs()).exp().ln_1p();
-        acts + beyond(self.low - acts) - beyond(acts - self.high)
+        AdcSaturation::shown(&[self.low, self.high, self.knee], acts)
     }
 
     /// What is shown where the channel follows by a fifth, on either side.

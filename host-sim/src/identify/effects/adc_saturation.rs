@@ -13,8 +13,9 @@ use crate::identify::term::{Parameter, Starts};
 /// The effect.
 pub(super) struct AdcSaturation;
 
-/// The friction channel's ends in the core's law.
+/// The friction channel's ends in the core's law, and the knee before them.
 const NAMES: [&str; 2] = [Law::<f64>::NAMES[0], Law::<f64>::NAMES[1]];
+const KNEE: &str = Law::<f64>::NAMES[2];
 /// Share of samples that are spikes at most.
 const SPIKES: f64 = 1e-3;
 /// A clipped end holds at least this share of a channel's samples, …
@@ -87,7 +88,8 @@ impl Effect for AdcSaturation {
 
     fn absent(&self, parameter: &str) -> f64 {
         let far = Law::<f64>::NO_END_NM;
-        if parameter == NAMES[0] { -far } else { far }
+        let ends = [(NAMES[0], -far), (NAMES[1], far)];
+        ends.iter().find(|(name, _)| *name == parameter).map_or(0.0, |(_, end)| *end)
     }
 
     fn contact(&self, view: &ContactView<'_>) -> Vec<ContactTerm> {
@@ -158,9 +160,8 @@ impl AdcSaturation {
         let term = ContactTerm::any(self.id(), parameters, Starts::At(starts.to_vec()), move |p, change| {
             change.ends_nm = Some(Ends::with_knee((-end_nm(p), end_nm(p)), knee_nm(p)));
         });
-        // Of the knee the core's law has nothing: it cuts where this ends.
         let export = move |p: &[f64]| {
-            let named = [(NAMES[0], -end_nm(p)), (NAMES[1], end_nm(p)), ("friction_knee_nm", knee_nm(p))];
+            let named = [(NAMES[0], -end_nm(p)), (NAMES[1], end_nm(p)), (KNEE, knee_nm(p))];
             named.map(|(name, value)| (name.to_string(), value)).to_vec()
         };
         let shown_nm = view.logs.iter().flat_map(|log| log.observed_nm.iter().copied()).collect();
@@ -267,12 +268,12 @@ mod tests {
         let export = term.export.as_ref().expect("a law of the core");
         let mut numbers = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).numbers;
         assert_eq!(export(&[1.4], &mut numbers), [(NAMES[1].to_string(), 2.8)]);
-        let law = Law::new(&[AdcSaturation.absent(NAMES[0]), 2.8]).expect("allowed");
+        let law = Law::new(&[AdcSaturation.absent(NAMES[0]), 2.8, AdcSaturation.absent(KNEE)]).expect("allowed");
         assert_eq!([law.shown_nm(-1e6), law.shown_nm(1e6)], [-1e6, 2.8]);
     }
 
     #[test]
-    fn a_knee_ends_beyond_what_was_shown_and_cuts_there_in_the_core() {
+    fn a_knee_ends_beyond_what_was_shown_and_is_the_cores() {
         let log = |amplitude_nm: f64| {
             let mut log = Log::default();
             log.set_signal(Signal::Time, (0..2000).map(|i| 1e-3 * f64::from(i)).collect());
@@ -293,6 +294,11 @@ mod tests {
         let named = export(&lowest, &mut numbers);
         assert!((named[1].1 - 3.0).abs() < 0.01 && named[0].1 == -named[1].1, "{named:?}");
         assert!((named[2].1 / (named[1].1 * f64::exp(-2.0)) - 1.0).abs() < 1e-9, "{named:?}");
+        let law = Law::new(&[named[0].1, named[1].1, named[2].1]).expect("allowed");
+        let mut change = Change::default();
+        (term.act)(&lowest, &mut change);
+        let ends = change.ends_nm.expect("ends");
+        assert!([-9.0, 0.3, 2.8, 3.5].iter().all(|nm| (law.shown_nm(*nm) - ends.shown(*nm)).abs() < 1e-9));
         // A knee as wide as the range would be another gain.
         let widest = export(&[lowest[0], 3.0], &mut numbers)[2].1;
         assert!((widest / (WIDEST_KNEE * named[1].1) - 1.0).abs() < 1e-9, "{widest}");
