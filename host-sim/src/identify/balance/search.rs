@@ -46,7 +46,8 @@ pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<
     balance.refit_level(&alone, 0.0);
     let mut alternatives = propose(balance, Company { forms: &[], residual: &alone.residual }, &|_| true);
     balance.forget_residuals();
-    let found = search_sets(balance, &alternatives, most);
+    let mut noise_of = None;
+    let found = search_sets(balance, &alternatives, most, &mut noise_of);
     // What is too small to matter hides nothing.
     if balance.difference(&found[0].residual, &alone.residual) < WORTH * balance.scale {
         return (alternatives, found);
@@ -73,57 +74,63 @@ pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<
         return (alternatives, found);
     }
     alternatives.extend(more);
-    balance.forget_residuals();
-    let found = search_sets(balance, &alternatives, most);
+    let found = search_sets(balance, &alternatives, most, &mut noise_of);
     (alternatives, found)
 }
 
-fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
-    let mut all = Vec::new();
-    for round in 0..2 {
-        let white: Vec<White> = alternatives.par_iter().map(|form| balance.white(form)).collect();
-        let chosen = |set: &[usize]| -> Vec<(&Alternative, Cow<'_, White>)> {
-            set.iter().map(|a| (&alternatives[*a], Cow::Borrowed(&white[*a]))).collect()
-        };
-        let mut found = vec![balance.solve(alternatives, &[])];
-        let mut parents: Vec<Solved> = found.clone();
-        for _ in 0..most {
-            // The best shape of each combination of effects leads on.
-            let glance = |(set, parent): (Vec<usize>, &Solved)| {
-                let forms = chosen(&set);
-                balance.glance(set, &forms, &parent.innovations)
-            };
-            let refit =
-                |near: &Glance| balance.solve_white(&near.set, &chosen(&near.set), Some(&near.innovations));
-            let solved = |sets: Vec<(Vec<usize>, &Solved)>, shapes: usize| -> Vec<Solved> {
-                let glances: Vec<Glance> = sets.into_par_iter().map(glance).collect();
-                let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), shapes);
-                best.par_iter().map(refit).collect()
-            };
-            let evidence = |s: &Solved| s.log_evidence;
-            let larger = solved(with_one_more(alternatives, &parents), SHAPES);
-            let mut larger = best_shapes(alternatives, larger, |s| (&s.set, evidence(s)), 1);
-            let leading = &larger[..larger.len().min(PARENTS)];
-            let exchanged = solved(with_another_form(alternatives, leading), 1);
-            larger.extend(exchanged);
-            let solved = best_shapes(alternatives, larger, |s| (&s.set, evidence(s)), 1);
-            parents = solved.iter().take(PARENTS).cloned().collect();
-            let best =
-                |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-            let worth = best(&solved) > best(&found);
-            found.extend(solved);
-            // A larger set is looked for where this one was worth it.
-            if !worth {
-                break;
-            }
-        }
-        found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        if round == 0 {
-            balance.refit_noise(&found[0]);
-        }
-        all = found;
+/// Sets with their evidence, best first, where the noise is that of a best set. It is taken from the best of those found, unless
+/// that is the one that it is of already.
+fn search_sets(
+    balance: &mut Balance,
+    alternatives: &[Alternative],
+    most: usize,
+    noise_of: &mut Option<Vec<usize>>,
+) -> Vec<Solved> {
+    let found = sets(balance, alternatives, most);
+    if noise_of.as_ref() == Some(&found[0].set) {
+        return found;
     }
-    all
+    balance.refit_noise(&found[0]);
+    *noise_of = Some(found[0].set.clone());
+    sets(balance, alternatives, most)
+}
+
+/// The same with the balance's noise as it is.
+fn sets(balance: &Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
+    let white: Vec<White> = alternatives.par_iter().map(|form| balance.white(form)).collect();
+    let chosen = |set: &[usize]| -> Vec<(&Alternative, Cow<'_, White>)> {
+        set.iter().map(|a| (&alternatives[*a], Cow::Borrowed(&white[*a]))).collect()
+    };
+    let glance = |(set, parent): (Vec<usize>, &Solved)| {
+        let forms = chosen(&set);
+        balance.glance(set, &forms, &parent.innovations)
+    };
+    let refit = |near: &Glance| balance.solve_white(&near.set, &chosen(&near.set), Some(&near.innovations));
+    let solved = |sets: Vec<(Vec<usize>, &Solved)>, shapes: usize| -> Vec<Solved> {
+        let glances: Vec<Glance> = sets.into_par_iter().map(glance).collect();
+        let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), shapes);
+        best.par_iter().map(refit).collect()
+    };
+    let of_each = |sets: Vec<Solved>| best_shapes(alternatives, sets, |s| (&s.set, s.log_evidence), 1);
+    let best = |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut found = vec![balance.solve(alternatives, &[])];
+    let mut parents: Vec<Solved> = found.clone();
+    for _ in 0..most {
+        // The best shape of each combination of effects leads on.
+        let mut larger = of_each(solved(with_one_more(alternatives, &parents), SHAPES));
+        let leading = &larger[..larger.len().min(PARENTS)];
+        larger.extend(solved(with_another_form(alternatives, leading), 1));
+        let larger = of_each(larger);
+        parents = larger.iter().take(PARENTS).cloned().collect();
+        let worth = best(&larger) > best(&found);
+        found.extend(larger);
+        // A larger set is looked for where this one was worth it.
+        if !worth {
+            break;
+        }
+    }
+    found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    found
 }
 
 /// Each of these sets with one more form, of an effect that it does not have, once.
@@ -240,7 +247,7 @@ mod tests {
             form("like_the_first", vec![column(&|i| wave(i) + 0.1 * (0.31 * i as f64).sin())]),
             form("as_like_it", vec![column(&|i| wave(i) + 0.1 * (0.43 * i as f64).sin())]),
         ];
-        let found = search_sets(&mut balance, &forms, 2);
+        let found = search_sets(&mut balance, &forms, 2, &mut None);
         let alone =
             found.iter().find(|solved| solved.set.len() == 1 && forms[solved.set[0]].effect == "first");
         assert_eq!(alone.unwrap().set, [0]);
@@ -262,7 +269,8 @@ mod tests {
         };
         let mut balance = balance(response);
         let best = |balance: &mut Balance, couples| {
-            search_sets(balance, &[form("spring", 0.2, couples), form("play", 0.5, couples)], 2)[0].set.len()
+            let forms = [form("spring", 0.2, couples), form("play", 0.5, couples)];
+            search_sets(balance, &forms, 2, &mut None)[0].set.len()
         };
         assert_eq!([best(&mut balance, false), best(&mut balance, true)], [2, 1]);
     }
