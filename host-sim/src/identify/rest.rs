@@ -415,21 +415,18 @@ fn follows(
 }
 
 /// What an alternative does in a linear balance: its size, relative to the efforts that it balances, from the residuals with
-/// and without it. Its columns do not take each other's shape as laws of friction do; that what it explains is no small part of
-/// what is left is enough. A robust likelihood may buy a better fit of the many rows by giving up a few, steps of the torque say:
-/// as far as it leaves more there than it takes elsewhere, nothing is explained.
+/// and without it. Its columns do not take each other's shape as laws of friction do; that it is no small part of what is
+/// left is enough.
 pub fn contribution(balance: &Balance, effect: &str, residual: &[f64], without: &[f64]) -> Contribution {
     let [block, _] = blocks(balance.row_step_s);
     let noise = Noise::white(balance.first_deviation.clone());
     let left = structured(residual, &noise, &balance.used, block, 0.0).0.sqrt();
     let change = balance.difference(residual, without);
-    let [with, before] = [residual, without].map(|left| balance.rms(left).powi(2));
-    let explained = (before - with).max(0.0).sqrt();
     let scale = balance.scale.max(1e-12);
     let of_bridge = effects::with_id(effect).is_some_and(|effect| effect.is_like_a_bridges_error());
     Contribution {
         size: change / scale,
-        over_rest: if explained > 0.0 { explained.min(change) / (LEFT_SHARE * left) } else { 0.0 },
+        over_rest: change / (LEFT_SHARE * left),
         known: if of_bridge { beyond_class(balance.bridge_zero / scale) } else { MODEL_FORM },
     }
 }
@@ -515,20 +512,6 @@ mod tests {
         let balance = balance(0.01, 4.0);
         let size = contribution(&balance, "", &[0.0; ROWS], &[0.01; ROWS]).size;
         assert!((size - 0.0025).abs() < 1e-12 && size < MODEL_FORM, "{size}");
-    }
-
-    #[test]
-    fn what_gives_up_a_few_rows_for_many_explains_nothing() {
-        let balance = balance(0.01, 1.0);
-        // A twentieth of the rows is left far off, the others fit.
-        let gives_up = |off: f64| {
-            let left: Vec<f64> = (0..ROWS).map(|i| if i < ROWS / 20 { off } else { 0.0 }).collect();
-            contribution(&balance, "", &left, &[0.01; ROWS])
-        };
-        let [fits, gives_up] = [0.0, 0.1].map(gives_up);
-        assert!(fits.is_told() && fits.over_form(0.0) > 2.0, "{fits:?}");
-        assert!(gives_up.is_told() && gives_up.over_form(0.0) < 2.0, "{gives_up:?}");
-        assert_eq!(gives_up.over_rest, 0.0);
     }
 
     #[test]
