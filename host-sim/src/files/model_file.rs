@@ -281,10 +281,9 @@ fn read_extension(table: &TableReader<'_>) -> Result<Extension, InputError> {
     match CoreExtension::with_id(id) {
         // An effect on the friction channel: the core says which parameters it has and checks them.
         Some(effect) => {
-            let required = effect.names().len() - effect.optional().len();
-            let value = |(at, name): (usize, &&'static str)| match at.checked_sub(required) {
+            let value = |(place, name): (usize, &&'static str)| match effect.absent(place) {
                 None => table.required_number(name, FINITE),
-                Some(at) => Ok(table.number(name, FINITE)?.unwrap_or(effect.optional()[at])),
+                Some(absent) => Ok(table.number(name, FINITE)?.unwrap_or(absent)),
             };
             let values: Vec<f64> = effect.names().iter().enumerate().map(value).collect::<Result<_, _>>()?;
             table.finish()?;

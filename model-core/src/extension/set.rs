@@ -44,9 +44,15 @@ macro_rules! effects {
             }
 
             /// Values of its last parameters where they are not given.
-            pub const fn optional(self) -> &'static [f64] {
+            const fn optional(self) -> &'static [f64] {
                 const NONE: &[f64] = &[];
                 match self { $(Self::$variant => [$($optional,)? NONE][0],)* }
+            }
+
+            /// Value of the parameter at this place where it is not given; `None` where it has to be.
+            pub fn absent(self, place: usize) -> Option<f64> {
+                let from = self.names().len().checked_sub(self.optional().len())?;
+                self.optional().get(place.checked_sub(from)?).copied()
             }
         }
 
@@ -75,7 +81,7 @@ macro_rules! effects {
                 let step_s = self.step_s;
                 match extension {
                     $(Extension::$variant => {
-                        let values = with_optional(values, extension.optional()).ok_or(wrong_count)?;
+                        let values = with_absent(values, extension).ok_or(wrong_count)?;
                         self.$field = Some($type::new(&values $(, { let $step = step_s; $step })?)?);
                     })*
                 }
@@ -109,15 +115,13 @@ effects! {
 }
 
 /// All values of an effect, of which the last ones may not be given; `None` where others are missing, or there are too many.
-fn with_optional<T: Real, const COUNT: usize>(values: &[T], optional: &[f64]) -> Option<[T; COUNT]> {
-    let from = COUNT.checked_sub(optional.len())?;
-    let is_whole = (from..=COUNT).contains(&values.len());
-    let value = |i: usize| {
-        let absent = || optional.get(i.wrapping_sub(from)).map(|value| T::from_f64(*value));
-        values.get(i).copied().or_else(absent)
-    };
-    let all = core::array::from_fn(|i| value(i).unwrap_or(T::from_f64(0.0)));
-    is_whole.then_some(all)
+fn with_absent<T: Real, const COUNT: usize>(values: &[T], extension: Extension) -> Option<[T; COUNT]> {
+    let mut all = [T::from_f64(0.0); COUNT];
+    for (place, value) in all.iter_mut().enumerate() {
+        let given = values.get(place).copied();
+        *value = given.or_else(|| extension.absent(place).map(T::from_f64))?;
+    }
+    (values.len() <= COUNT).then_some(all)
 }
 
 impl<T: Real> Extensions<T> {
