@@ -48,14 +48,17 @@ impl<T: Real> AdcSaturation<T> {
 
     /// The same for any values in the order of [`Self::NAMES`], as a search tries them; an end may be infinite.
     #[inline]
-    pub fn shown(&[low, high, knee]: &[T; 3], torque_nm: T) -> T {
-        let zero = T::from_f64(0.0);
-        if knee <= zero {
-            return torque_nm.at_least(low).at_most(high);
-        }
+    pub fn shown(values: &[T; 3], torque_nm: T) -> T {
+        let [low, high, knee] = *values;
+        if knee <= T::ZERO { torque_nm.at_least(low).at_most(high) } else { Self::bent(values, torque_nm) }
+    }
+
+    /// The same where there is a knee. By itself, since what a control tick costs without it should not grow by its logarithms.
+    #[inline(never)]
+    fn bent(&[low, high, knee]: &[T; 3], torque_nm: T) -> T {
         // What is beyond an end, softly: of a large excess that itself, so that no exponential grows.
         let beyond =
-            |excess_nm: T| excess_nm.at_least(zero) + knee * (-(excess_nm / knee).abs()).exp().ln_1p();
+            |excess_nm: T| excess_nm.at_least(T::ZERO) + knee * (-(excess_nm / knee).abs()).exp().ln_1p();
         torque_nm + beyond(low - torque_nm) - beyond(torque_nm - high)
     }
 }
