@@ -152,13 +152,14 @@ pub(crate) struct Observer {
     averaging: f32,
 }
 
-/// What the observer remembers.
+/// What the observer remembers; what is large of it last.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub(crate) struct ObserverState {
     rubber: RubberState,
-    around: ExtendedState<f32>,
     lowpass: LowpassState,
     mean_square: f32,
+    around: ExtendedState<f32>,
 }
 
 /// Result of one tick.

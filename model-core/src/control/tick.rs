@@ -38,8 +38,10 @@ const BLINK_TICKS: u64 = 1 << 11;
 /// What the motors are asked for while they are brought to rest.
 const STOP: Demand = Demand { m1_torque_nm: 0.0, m2_mode: M2Mode::Speed, m2: 0.0 };
 
-/// Everything that changes from tick to tick.
+/// Everything that changes from tick to tick. In the order in which it is written here: the observer, which remembers hundreds of
+/// samples, comes last, so that an instruction of the chip reaches what comes before without an address of its own.
 #[derive(Debug, Clone)]
+#[repr(C)]
 pub struct ControlState {
     tick: u64,
     restart: Restart,

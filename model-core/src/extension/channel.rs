@@ -7,6 +7,7 @@ use crate::sensor::{SecondOrderState, SensorChain, SensorUndo};
 
 /// What the channel remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub(super) struct ChannelState<T> {
     ring: SecondOrderState<T>,
     past: Past<T>,

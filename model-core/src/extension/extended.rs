@@ -45,8 +45,9 @@ pub struct ExtendedFriction<T> {
     radius_m: T,
 }
 
-/// State of an extended model.
+/// State of an extended model; the channel, which remembers many samples, last.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub struct ExtendedState<T> {
     friction: FrictionState<T>,
     force_n: T,
