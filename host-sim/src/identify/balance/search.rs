@@ -10,6 +10,8 @@ use crate::identify::contact::search::WORTH;
 
 /// Shapes of a combination of effects that are solved, of those that a glance ranks.
 const SHAPES: usize = 2;
+/// Combinations from which a larger one is looked for.
+const PARENTS: usize = 3;
 
 /// What proposes forms: of the effects that are wanted, for what these forms leave.
 pub type Propose<'p> =
@@ -44,7 +46,8 @@ pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<
     balance.refit_level(&alone, 0.0);
     let mut alternatives = propose(balance, Company { forms: &[], residual: &alone.residual }, &|_| true);
     balance.forget_residuals();
-    let found = search_sets(balance, &alternatives, most);
+    let mut noise_of = None;
+    let found = search_sets(balance, &alternatives, most, &mut noise_of);
     // What is too small to matter hides nothing.
     if balance.difference(&found[0].residual, &alone.residual) < WORTH * balance.scale {
         return (alternatives, found);
@@ -71,50 +74,63 @@ pub fn search(balance: &mut Balance, propose: Propose<'_>, most: usize) -> (Vec<
         return (alternatives, found);
     }
     alternatives.extend(more);
-    balance.forget_residuals();
-    let found = search_sets(balance, &alternatives, most);
+    let found = search_sets(balance, &alternatives, most, &mut noise_of);
     (alternatives, found)
 }
 
-fn search_sets(balance: &mut Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
-    let mut all = Vec::new();
-    for round in 0..2 {
-        let white: Vec<White> = alternatives.par_iter().map(|form| balance.white(form)).collect();
-        let chosen = |set: &[usize]| -> Vec<(&Alternative, Cow<'_, White>)> {
-            set.iter().map(|a| (&alternatives[*a], Cow::Borrowed(&white[*a]))).collect()
-        };
-        let mut found = vec![balance.solve(alternatives, &[])];
-        let mut parents: Vec<Solved> = found.clone();
-        for _ in 0..most {
-            // The best shape of each combination of effects leads on.
-            let glance = |(set, parent): (Vec<usize>, &Solved)| {
-                let forms = chosen(&set);
-                balance.glance(set, &forms, &parent.innovations)
-            };
-            let glances: Vec<Glance> =
-                with_one_more(alternatives, &parents).into_par_iter().map(glance).collect();
-            let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), SHAPES);
-            let refit =
-                |near: &Glance| balance.solve_white(&near.set, &chosen(&near.set), Some(&near.innovations));
-            let refitted: Vec<Solved> = best.par_iter().map(refit).collect();
-            let solved = best_shapes(alternatives, refitted, |s| (&s.set, s.log_evidence), 1);
-            parents = solved.iter().take(3).cloned().collect();
-            let best =
-                |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-            let worth = best(&solved) > best(&found);
-            found.extend(solved);
-            // A larger set is looked for where this one was worth it.
-            if !worth {
-                break;
-            }
-        }
-        found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        if round == 0 {
-            balance.refit_noise(&found[0]);
-        }
-        all = found;
+/// Sets with their evidence, best first, where the noise is that of a best set. It is taken from the best of those found, unless
+/// that is the one that it is of already.
+fn search_sets(
+    balance: &mut Balance,
+    alternatives: &[Alternative],
+    most: usize,
+    noise_of: &mut Option<Vec<usize>>,
+) -> Vec<Solved> {
+    let found = sets(balance, alternatives, most);
+    if noise_of.as_ref() == Some(&found[0].set) {
+        return found;
     }
-    all
+    balance.refit_noise(&found[0]);
+    *noise_of = Some(found[0].set.clone());
+    sets(balance, alternatives, most)
+}
+
+/// The same with the balance's noise as it is.
+fn sets(balance: &Balance, alternatives: &[Alternative], most: usize) -> Vec<Solved> {
+    let white: Vec<White> = alternatives.par_iter().map(|form| balance.white(form)).collect();
+    let chosen = |set: &[usize]| -> Vec<(&Alternative, Cow<'_, White>)> {
+        set.iter().map(|a| (&alternatives[*a], Cow::Borrowed(&white[*a]))).collect()
+    };
+    let glance = |(set, parent): (Vec<usize>, &Solved)| {
+        let forms = chosen(&set);
+        balance.glance(set, &forms, &parent.innovations)
+    };
+    let refit = |near: &Glance| balance.solve_white(&near.set, &chosen(&near.set), Some(&near.innovations));
+    let solved = |sets: Vec<(Vec<usize>, &Solved)>, shapes: usize| -> Vec<Solved> {
+        let glances: Vec<Glance> = sets.into_par_iter().map(glance).collect();
+        let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), shapes);
+        best.par_iter().map(refit).collect()
+    };
+    let of_each = |sets: Vec<Solved>| best_shapes(alternatives, sets, |s| (&s.set, s.log_evidence), 1);
+    let best = |sets: &[Solved]| sets.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut found = vec![balance.solve(alternatives, &[])];
+    let mut parents: Vec<Solved> = found.clone();
+    for _ in 0..most {
+        // The best shape of each combination of effects leads on.
+        let mut larger = of_each(solved(with_one_more(alternatives, &parents), SHAPES));
+        let leading = &larger[..larger.len().min(PARENTS)];
+        larger.extend(solved(with_another_form(alternatives, leading), 1));
+        let larger = of_each(larger);
+        parents = larger.iter().take(PARENTS).cloned().collect();
+        let worth = best(&larger) > best(&found);
+        found.extend(larger);
+        // A larger set is looked for where this one was worth it.
+        if !worth {
+            break;
+        }
+    }
+    found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    found
 }
 
 /// Each of these sets with one more form, of an effect that it does not have, once.
@@ -137,6 +153,28 @@ fn with_one_more<'p>(alternatives: &[Alternative], parents: &'p [Solved]) -> Vec
         }
     }
     sets
+}
+
+/// Each of these sets with one of its forms exchanged for another of the same effect that has no more numbers: a shape that was best
+/// alone may have taken a part of another cause with numbers that it does not need beside that.
+fn with_another_form<'p>(alternatives: &[Alternative], sets: &'p [Solved]) -> Vec<(Vec<usize>, &'p Solved)> {
+    let mut out = Vec::new();
+    for solved in sets.iter().filter(|solved| solved.set.len() > 1) {
+        for own in &solved.set {
+            let rest = || solved.set.iter().copied().filter(|other| other != own);
+            let coupled = rest().any(|other| alternatives[other].is_coupling());
+            for (place, form) in alternatives.iter().enumerate() {
+                let given = &alternatives[*own];
+                let like = form.effect == given.effect && form.parameters.len() <= given.parameters.len();
+                if place != *own && like && !(coupled && form.is_coupling()) {
+                    let mut set: Vec<usize> = rest().chain([place]).collect();
+                    set.sort_unstable();
+                    out.push((set, solved));
+                }
+            }
+        }
+    }
+    out
 }
 
 /// The best of these, each a set with its evidence, at most so many of each combination of effects, the best first.
@@ -189,6 +227,35 @@ mod tests {
     }
 
     #[test]
+    fn a_form_that_was_best_alone_gives_way_to_the_one_that_is_best_beside_another() {
+        let half = |i: usize| if i < ROWS / 2 { 1.0 } else { -1.0 };
+        let wave = |i: usize| (0.2 * i as f64).sin();
+        let column = |of: &dyn Fn(usize) -> f64| (0..ROWS).map(of).collect::<Vec<f64>>();
+        // A part of the second cause is a wave with another sign in each half, which a wave for each half takes.
+        let second = |i: usize| half(i) * (wave(i) + (0.5 * i as f64).cos());
+        let noise = white(ROWS, 2);
+        let mut balance = balance(column(&|i| 9.0 * wave(i) + 3.0 * second(i) + noise[i]));
+        let form = |effect, columns: Vec<Vec<f64>>| {
+            let size = |i: usize| Parameter::amplitude(format!("size_{i}"), 30.0);
+            Alternative::columns(effect, (0..columns.len()).map(size).collect(), columns)
+        };
+        let of_half = |sign: f64| column(&|i| if half(i) == sign { wave(i) } else { 0.0 });
+        let forms = [
+            form("first", vec![of_half(1.0), of_half(-1.0)]),
+            form("first", vec![column(&wave)]),
+            form("second", vec![column(&second)]),
+            // Alone each is more like what is seen than the second cause.
+            form("like_the_first", vec![column(&|i| wave(i) + 0.1 * (0.31 * i as f64).sin())]),
+            form("as_like_it", vec![column(&|i| wave(i) + 0.1 * (0.43 * i as f64).sin())]),
+        ];
+        let found = search_sets(&mut balance, &forms, 2, &mut None);
+        let alone =
+            found.iter().find(|solved| solved.set.len() == 1 && forms[solved.set[0]].effect == "first");
+        assert_eq!(alone.unwrap().set, [0]);
+        assert_eq!(found[0].set, [1, 2]);
+    }
+
+    #[test]
     fn motor_and_disc_have_one_coupling() {
         let wave = |k: f64| -> Vec<f64> { (0..ROWS).map(|i| (k * i as f64).sin()).collect() };
         let noise = white(ROWS, 2);
@@ -203,7 +270,8 @@ mod tests {
         };
         let mut balance = balance(response);
         let best = |balance: &mut Balance, couples| {
-            search_sets(balance, &[form("spring", 0.2, couples), form("play", 0.5, couples)], 2)[0].set.len()
+            let forms = [form("spring", 0.2, couples), form("play", 0.5, couples)];
+            search_sets(balance, &forms, 2, &mut None)[0].set.len()
         };
         assert_eq!([best(&mut balance, false), best(&mut balance, true)], [2, 1]);
     }
