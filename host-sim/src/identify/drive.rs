@@ -340,14 +340,35 @@ impl Bearing {
             + self.viscous_nm_s * speed_rad_s
     }
 
-    /// Speed after a step of a body that would have this one without that friction: implicit, so that one that stands rests.
-    pub fn slowed(&self, free_rad_s: f64, step_s: f64, inertia_kg_m2: f64) -> f64 {
-        let coulomb = step_s * self.coulomb_nm / inertia_kg_m2;
+    /// What that friction does in a step to a body of this inertia.
+    pub fn slower(&self, step_s: f64, inertia_kg_m2: f64) -> Slower {
+        let coulomb_rad_s = step_s * self.coulomb_nm / inertia_kg_m2;
         let viscous = 1.0 + step_s * self.viscous_nm_s / inertia_kg_m2;
-        if free_rad_s.abs() > coulomb + viscous * self.turning_rad_s {
-            (free_rad_s - coulomb.copysign(free_rad_s)) / viscous
+        Slower {
+            coulomb_rad_s,
+            least_rad_s: coulomb_rad_s + viscous * self.turning_rad_s,
+            kept: viscous.recip(),
+            kept_at_rest: (viscous + coulomb_rad_s / self.turning_rad_s).recip(),
+        }
+    }
+}
+
+/// What a bearing's friction does to a body's speed in a step: implicit, so that one that stands rests.
+pub struct Slower {
+    coulomb_rad_s: f64,
+    least_rad_s: f64,
+    kept: f64,
+    kept_at_rest: f64,
+}
+
+impl Slower {
+    /// Speed after the step of a body that would have this one without that friction.
+    #[inline]
+    pub fn slowed(&self, free_rad_s: f64) -> f64 {
+        if free_rad_s.abs() > self.least_rad_s {
+            (free_rad_s - self.coulomb_rad_s.copysign(free_rad_s)) * self.kept
         } else {
-            free_rad_s / (viscous + coulomb / self.turning_rad_s)
+            free_rad_s * self.kept_at_rest
         }
     }
 }

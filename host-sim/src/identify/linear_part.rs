@@ -1,5 +1,7 @@
 //! A balance that is linear in its parameters, searched: the drive's and the normal-load actuator's.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::balance::{self, Alternative, Balance, Company, Solved};
@@ -52,7 +54,7 @@ impl Linear {
             let effects = names.zip(self.contributions(solved)).map(|(effect, own)| (effect, LAW_FORM, own));
             Candidate { told: self.told(solved), ..Candidate::new(place, solved.log_evidence, effects) }
         };
-        self.solved.iter().enumerate().filter(wanted).map(of_set).collect()
+        self.solved.par_iter().enumerate().filter(wanted).map(of_set).collect()
     }
 
     /// Whether a set says of a channel nothing but what is heard of it.
@@ -136,11 +138,12 @@ impl Linear {
     fn contributions(&self, solved: &Solved) -> Vec<Contribution> {
         let own = |a: &usize| {
             let set: Vec<usize> = solved.set.iter().copied().filter(|b| b != a).collect();
-            let known = self.solved.iter().find(|other| other.set == set).map(|other| other.p.clone());
-            let without = known.unwrap_or_else(|| self.balance.solve(&self.alternatives, &set).p);
-            let of_sensors = self.balance.possible_errors(&without);
-            let [with, without] = [&solved.set, &set]
-                .map(|set| self.balance.left_beside_errors(&of_sensors, &self.alternatives, set));
+            let known = self.solved.iter().find(|other| other.set == set);
+            let without =
+                known.map_or_else(|| Cow::Owned(self.balance.solve(&self.alternatives, &set)), Cow::Borrowed);
+            let of_sensors = self.balance.possible_errors(&without.p);
+            let [with, without] = [solved, &without]
+                .map(|solved| self.balance.left_beside_errors(&of_sensors, &self.alternatives, solved));
             rest::contribution(&self.balance, self.alternatives[*a].effect, &with, &without)
         };
         solved.set.iter().map(own).collect()

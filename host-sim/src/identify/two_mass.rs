@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::balance::{Alternative, DiscMotion, Solved};
+use super::balance::{Alternative, Balance, DiscMotion, Weighed};
 use super::contact::problem::{KEPT_PROMISE, student_weight};
 use super::coupling::{Coupling, Law};
 use super::drive::{Bearing, DriveLog, INERTIA};
@@ -61,6 +61,7 @@ fn shaft_torque(
     let (disc, omega, k) = (law.disc_inertia, law.omega_rad_s, law.stiffness);
     let substeps = (omega * dt / TURN_IN_A_STEP).ceil().max(1.0) as usize;
     let h = dt / substeps as f64;
+    let (per_torque, slower) = (h / disc, bearing.slower(h, disc));
     let pull = pull.min(SLOWER_THAN_MODE * omega * dt);
     let free = vec![0.0; n];
     let friction = log.friction.as_ref().unwrap_or(&free);
@@ -93,9 +94,9 @@ fn shaft_torque(
             q += 0.5 * h * w;
             let shaft = law.torque(motor - q, rate / dt - w);
             let rubbed = friction[i - 1] + (friction[i] - friction[i - 1]) * part;
-            w += h * (shaft - rubbed - borne) / disc;
+            w += per_torque * (shaft - rubbed - borne);
             if on_disc > 0.0 {
-                w = bearing.slowed(w, h, disc);
+                w = slower.slowed(w);
             }
             q += 0.5 * h * w;
         }
@@ -183,7 +184,7 @@ pub fn alternatives_of_grid(
     }
     match view.fixed {
         Some(fixed) => of_constants(effect, view, fixed).into_iter().collect(),
-        None => searched(effect, view, &grid),
+        None => searched(effect, view, grid),
     }
 }
 
@@ -205,22 +206,25 @@ fn stated(
 }
 
 /// The best plain coupling of a grid, and where one is asked for the best of each other shape.
-fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Vec<Alternative> {
+fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> Vec<Alternative> {
     let borne = |forms: &[&Alternative]| Bearing::beside(view.balance, forms, view.scales);
     let trial_near =
-        |numbers: &Coupling, bearing: &Bearing, pull: f64, near: Option<&Solved>| -> Option<Trial> {
+        |numbers: &Coupling, bearing: &Bearing, pull: f64, near: Option<&[f64]>| -> Option<Trial> {
             let alternative = alternative(effect, view, numbers, bearing, pull)?;
-            let solved = view.balance.solve_near(&view.company.with(&alternative), near);
-            Some(Trial { numbers: *numbers, alternative, solved })
+            let seen = view.balance.weigh(&view.company.with(&alternative), near);
+            Some(Trial { numbers: *numbers, alternative, seen })
         };
     let trial = |numbers: &Coupling, bearing: &Bearing, pull: f64| trial_near(numbers, bearing, pull, None);
     let refined_by = |start: Trial, bearing: &Bearing, pull: f64| {
-        refined(view, start, &|numbers: &Coupling, near: &Solved| {
-            trial_near(numbers, bearing, pull, Some(near))
-        })
+        let trial = |numbers: &Coupling, near: &[f64]| trial_near(numbers, bearing, pull, Some(near));
+        let glance = |numbers: &Coupling, near: &[f64]| {
+            let alternative = alternative(effect, view, numbers, bearing, pull)?;
+            Some(view.balance.glance(&view.company.with(&alternative), near).innovations)
+        };
+        refined(view.balance, start, &trial, &glance)
     };
     let better = |a: (Trial, f64), b: (Trial, f64)| {
-        if a.0.solved.log_evidence + a.1 < b.0.solved.log_evidence + b.1 { b } else { a }
+        if a.0.seen.log_evidence + a.1 < b.0.seen.log_evidence + b.1 { b } else { a }
     };
     let best_of = |starts: Vec<Trial>, bearing: &Bearing| -> Option<(Trial, f64)> {
         starts.into_par_iter().filter_map(|start| refined_by(start, bearing, PULL)).reduce_with(better)
@@ -242,10 +246,15 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
     let tried = |of: Vec<Coupling>| -> Vec<Trial> {
         let of_numbers = |numbers: Coupling| trial(&numbers, &bearing, PULL);
         let mut tried: Vec<Trial> = of.into_par_iter().filter_map(of_numbers).collect();
-        tried.sort_by(|a, b| b.solved.log_evidence.total_cmp(&a.solved.log_evidence));
+        tried.sort_by(|a, b| b.seen.log_evidence.total_cmp(&a.seen.log_evidence));
         tried
     };
-    let mut of_grid = tried(grid.iter().flat_map(Coupling::borne_either_way).collect());
+    let borne_either_way = |of: &[Coupling]| -> Vec<Trial> {
+        let mut tried = tried(of.iter().flat_map(Coupling::borne_either_way).collect());
+        tried.truncate(STARTS);
+        tried
+    };
+    let mut of_grid = tried(grid);
     // Of each width the best, so that the fits do not all start in one valley.
     let mut widths: Vec<f64> = Vec::new();
     of_grid.retain(|t| {
@@ -253,12 +262,12 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         widths.push(t.numbers.gap_rad);
         new
     });
-    // What bends a little is near what does not.
-    let best_bent = of_grid.iter().map(|t| t.numbers.bent()).collect();
-    of_grid.truncate(STARTS);
-    let Some(plain) = best_of(of_grid, &bearing) else { return Vec::new() };
+    let of_grid: Vec<Coupling> = of_grid.iter().map(|t| t.numbers).take(2 * STARTS).collect();
+    // Which side bears is told where the coupling is about right.
+    let starts = borne_either_way(&of_grid[..of_grid.len().min(STARTS)]);
+    let Some(plain) = best_of(starts, &bearing) else { return Vec::new() };
     let nothing = view.balance.solve_forms(view.company.forms).log_evidence;
-    if plain.0.solved.log_evidence + plain.1 < nothing {
+    if plain.0.seen.log_evidence + plain.1 < nothing {
         // Where nothing asks for a coupling, its numbers are of no account.
         return made(plain, &bearing).into_iter().collect();
     }
@@ -268,9 +277,9 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: &[Coupling]) -> Ve
         let stages = plain.0.numbers.in_stages(view.inertia, view.scales.effort);
         best_of(tried(stages), &bearing)
     };
-    let mut best_bent = tried(best_bent);
-    best_bent.truncate(STARTS);
-    let bent = best_of(best_bent, &bearing);
+    // What bends a little is near what does not.
+    let bent: Vec<Coupling> = of_grid.iter().map(Coupling::bent).collect();
+    let bent = best_of(borne_either_way(&bent), &bearing);
     // Over the edge of a dead zone the likelihood is rough, and over a rounded one it is not: what was found there is a start too.
     let unbent = bent.as_ref().and_then(|(bent, _)| {
         let start = trial(&Coupling { bend: 0.0, ..bent.numbers }, &bearing, PULL)?;
@@ -304,17 +313,17 @@ fn reckoned(
 struct Trial {
     numbers: Coupling,
     alternative: Alternative,
-    solved: Solved,
+    seen: Weighed,
 }
 
 /// Gauss–Newton with damping on the logarithms; the base parameters are solved for each trial (variable projection). With
-/// Occam's factor of the numbers; `None` where no derivative exists.
+/// Occam's factor of the numbers; `None` where no derivative exists. `glance` is what a coupling leaves near a trial.
 fn refined(
-    view: &DriveView<'_>,
+    balance: &Balance,
     start: Trial,
-    trial: &(dyn Fn(&Coupling, &Solved) -> Option<Trial> + Sync),
+    trial: &dyn Fn(&Coupling, &[f64]) -> Option<Trial>,
+    glance: &(dyn Fn(&Coupling, &[f64]) -> Option<Vec<f64>> + Sync),
 ) -> Option<(Trial, f64)> {
-    let balance = view.balance;
     let step = if start.numbers.gap_rad > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
     let mut log_occam = None;
@@ -322,14 +331,14 @@ fn refined(
     let mut slopes: Option<Vec<Vec<f64>>> = None;
     for _ in 0..ITERATIONS {
         let p = best.numbers.fitted();
-        let r = &best.solved.innovations;
+        let r = &best.seen.innovations;
         let fresh = slopes.is_none();
         let slope = |i: usize| {
             let moved = |step: f64| {
                 let mut q = p.clone();
                 q[i] += step;
-                let there = trial(&best.numbers.with(&q), &best.solved)?;
-                Some(there.solved.innovations.iter().zip(r).map(|(a, b)| (b - a) / step).collect())
+                let there = glance(&best.numbers.with(&q), r)?;
+                Some(there.iter().zip(r).map(|(a, b)| (b - a) / step).collect())
             };
             // At the end of what is allowed the other way.
             moved(step).or_else(|| moved(-step))
@@ -348,8 +357,8 @@ fn refined(
             let d = linear::factor(&damped).solve(&g);
             let d = &d * (REACH / d.amax().max(REACH));
             let q: Vec<f64> = p.iter().zip(d.iter()).map(|(p, d)| p + d).collect();
-            let there = trial(&best.numbers.with(&q), &best.solved);
-            let gain = there.map(|t| (t.solved.log_evidence - best.solved.log_evidence, t));
+            let there = trial(&best.numbers.with(&q), r);
+            let gain = there.map(|t| (t.seen.log_evidence - best.seen.log_evidence, t));
             let promised = BALANCE_SHARE * (g.dot(&d) - 0.5 * d.dot(&(&h * &d)));
             better = gain.filter(|(gained, _)| *gained > 0.0).map(|(gained, t)| (gained, promised, d, t));
             if better.is_some() {
@@ -367,7 +376,7 @@ fn refined(
             // Over play the likelihood is rough: what one step makes of it is no slope.
             if !there.numbers.is_play() {
                 let ratios = vec![1.0; step.len()];
-                linear::mend_slopes(&mut columns, [r, &there.solved.innovations], step.as_slice(), &ratios);
+                linear::mend_slopes(&mut columns, [r, &there.seen.innovations], step.as_slice(), &ratios);
             }
             slopes = Some(columns);
         }
@@ -457,7 +466,7 @@ pub(super) mod tests {
             fixed: None,
             bearing: None,
         };
-        let forms = searched(effect, &view, grid).into_iter();
+        let forms = searched(effect, &view, grid.to_vec()).into_iter();
         let best = forms.max_by(|a, b| {
             let evidence = |form: &Alternative| balance.solve_forms(&[form]).log_evidence;
             evidence(a).total_cmp(&evidence(b))

@@ -15,6 +15,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 pub use self::search::{Company, Propose, search};
+pub use self::solve::Weighed;
 use super::contact::problem::FREEDOM;
 use super::filters::{self, deviation_by_median, local_maximum};
 use super::rest;
@@ -632,7 +633,8 @@ pub(super) mod tests {
         assert!(balance.difference(&causes[0], &causes[1]) > 0.7);
         let errors = balance.possible_errors(&without.p);
         assert!((errors[0] - 0.1).abs() < 1e-12, "{errors:?}");
-        let [with, without] = [&[0][..], &[]].map(|set| balance.left_beside_errors(&errors, &forms, set));
+        let [with, without] =
+            [&with, &without].map(|solved| balance.left_beside_errors(&errors, &forms, solved));
         assert!((balance.difference(&with, &without) - 0.9).abs() < 0.05);
     }
 

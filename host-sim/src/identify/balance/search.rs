@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use super::solve::{Glance, White};
+use super::solve::{Weighed, White};
 use super::{Alternative, Balance, Solved};
 use crate::identify::contact::search::WORTH;
 
@@ -102,13 +102,14 @@ fn sets(balance: &Balance, alternatives: &[Alternative], most: usize) -> Vec<Sol
         set.iter().map(|a| (&alternatives[*a], Cow::Borrowed(&white[*a]))).collect()
     };
     let glance = |(set, parent): (Vec<usize>, &Solved)| {
-        let forms = chosen(&set);
-        balance.glance(set, &forms, &parent.innovations)
+        let weighed = balance.weighed(&chosen(&set), Some(&parent.innovations), 1);
+        (set, weighed)
     };
-    let refit = |near: &Glance| balance.solve_white(&near.set, &chosen(&near.set), Some(&near.innovations));
+    let refit =
+        |(set, near): &(Vec<usize>, Weighed)| balance.solve_white(set, &chosen(set), Some(&near.innovations));
     let solved = |sets: Vec<(Vec<usize>, &Solved)>, shapes: usize| -> Vec<Solved> {
-        let glances: Vec<Glance> = sets.into_par_iter().map(glance).collect();
-        let best = best_shapes(alternatives, glances, |g| (&g.set, g.log_evidence), shapes);
+        let glances: Vec<(Vec<usize>, Weighed)> = sets.into_par_iter().map(glance).collect();
+        let best = best_shapes(alternatives, glances, |(set, seen)| (set, seen.log_evidence), shapes);
         best.par_iter().map(refit).collect()
     };
     let of_each = |sets: Vec<Solved>| best_shapes(alternatives, sets, |s| (&s.set, s.log_evidence), 1);

@@ -30,12 +30,12 @@ struct Point {
     fit: Fit,
 }
 
-/// A set that was looked at for one step.
-pub(super) struct Glance {
-    pub(super) set: Vec<usize>,
-    pub(super) log_evidence: f64,
+/// What forms that stand together leave, and its evidence.
+pub struct Weighed {
+    /// ln evidence, the likelihood with its share.
+    pub log_evidence: f64,
     /// What is new in each row, over its deviation.
-    pub(super) innovations: Vec<f64>,
+    pub innovations: Vec<f64>,
 }
 
 impl Balance {
@@ -69,22 +69,26 @@ impl Balance {
         Solved { set: set.to_vec(), ..self.solved(self.priors(), forms, near) }
     }
 
-    /// The same for one step, not reweighted: shapes compare.
-    pub(super) fn glance(&self, set: Vec<usize>, forms: &Chosen<'_>, near: &[f64]) -> Glance {
-        let point = self.point(self.priors(), forms, Some(near), 1);
+    /// The same for so many steps, without what nobody asks of most sets.
+    pub(super) fn weighed(&self, forms: &Chosen<'_>, near: Option<&[f64]>, steps: usize) -> Weighed {
+        let point = self.point(self.priors(), forms, near, steps);
         let log_evidence = self.log_evidence(&point, forms, &self.covariance(&point));
-        Glance { set, log_evidence, innovations: point.fit.innovations }
+        Weighed { log_evidence, innovations: point.fit.innovations }
     }
 
     /// Solves these forms; the set of what it gives is empty.
     pub fn solve_forms(&self, chosen: &[&Alternative]) -> Solved {
-        self.solve_near(chosen, None)
+        self.solve_white(&[], &self.chosen(chosen.iter().copied()), None)
     }
 
-    /// The same from the weights of a solution that is near.
-    pub fn solve_near(&self, chosen: &[&Alternative], near: Option<&Solved>) -> Solved {
-        let near = near.map(|near| near.innovations.as_slice());
-        self.solve_white(&[], &self.chosen(chosen.iter().copied()), near)
+    /// Weighs these forms, from the weights of innovations where some are near.
+    pub fn weigh(&self, chosen: &[&Alternative], near: Option<&[f64]>) -> Weighed {
+        self.weighed(&self.chosen(chosen.iter().copied()), near, MOST_STEPS)
+    }
+
+    /// The same for one step, not reweighted: shapes compare, and slopes are the same.
+    pub fn glance(&self, chosen: &[&Alternative], near: &[f64]) -> Weighed {
+        self.weighed(&self.chosen(chosen.iter().copied()), Some(near), 1)
     }
 
     /// Of what a solution takes for errors of the sensors as much as they are known to have: a deviation of each.
@@ -102,19 +106,19 @@ impl Balance {
         left
     }
 
-    /// What a set leaves beside these errors of the sensors.
+    /// What a solved set leaves beside these errors of the sensors.
     pub fn left_beside_errors(
         &self,
         errors: &[f64],
         alternatives: &[Alternative],
-        set: &[usize],
+        solved: &Solved,
     ) -> Vec<f64> {
         let mut parameters = self.priors();
         for (q, error) in parameters.iter_mut().skip(self.sensors).zip(errors) {
             (q.mean, q.sd) = (*error, HELD * q.sd);
         }
-        let forms = self.chosen(set.iter().map(|a| &alternatives[*a]));
-        self.solved(parameters, &forms, None).residual
+        let forms = self.chosen(solved.set.iter().map(|a| &alternatives[*a]));
+        self.solved(parameters, &forms, Some(&solved.innovations)).residual
     }
 
     /// These forms, with these priors of the base.
