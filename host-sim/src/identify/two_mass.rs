@@ -221,7 +221,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> 
             let alternative = alternative(effect, view, numbers, bearing, pull)?;
             Some(view.balance.glance(&view.company.with(&alternative), near).innovations)
         };
-        refined(view.balance, start, &trial, &glance)
+        refined(view.balance, start, trial, glance)
     };
     let better = |a: (Trial, f64), b: (Trial, f64)| {
         if a.0.seen.log_evidence + a.1 < b.0.seen.log_evidence + b.1 { b } else { a }
@@ -321,8 +321,8 @@ struct Trial {
 fn refined(
     balance: &Balance,
     start: Trial,
-    trial: &dyn Fn(&Coupling, &[f64]) -> Option<Trial>,
-    glance: &(dyn Fn(&Coupling, &[f64]) -> Option<Vec<f64>> + Sync),
+    trial: impl Fn(&Coupling, &[f64]) -> Option<Trial>,
+    glance: impl Fn(&Coupling, &[f64]) -> Option<Vec<f64>> + Sync,
 ) -> Option<(Trial, f64)> {
     let step = if start.numbers.gap_rad > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
