@@ -254,6 +254,12 @@ mod tests {
             found.iter().find(|solved| solved.set.len() == 1 && forms[solved.set[0]].effect == "first");
         assert_eq!(alone.unwrap().set, [0]);
         assert_eq!(found[0].set, [1, 2]);
+        // The plainer one does not buy numbers.
+        let others = |set: &[usize]| -> Vec<Vec<usize>> {
+            let solved = [balance.solve(&forms, set)];
+            with_another_form(&forms, &solved).into_iter().map(|(set, _)| set).collect()
+        };
+        assert_eq!((others(&[0, 2]), others(&[1, 2])), (vec![vec![1, 2]], vec![]));
     }
 
     #[test]
