@@ -343,7 +343,7 @@ fn drive_alternatives(
     told: &[Heard],
 ) -> (Balance, Vec<Alternative>) {
     let prior = rig.map(linear_part::drive_prior).unwrap_or_default();
-    let scales = DriveScales::new(logs);
+    let scales = part.drive_scales.unwrap_or_else(|| DriveScales::new(logs));
     let balance = drive::balance(logs, &prior, &scales);
     let balance = match drive::shown_response(&balance, logs) {
         Some(response) => balance.with_response(response),
@@ -360,7 +360,7 @@ fn drive_alternatives(
     let known = |own: &Alternative, bearing: Option<&Bearing>| -> Vec<Alternative> {
         let view = DriveView {
             logs,
-            scales: part.drive_scales.as_ref().unwrap_or(&scales),
+            scales: &scales,
             balance: &balance,
             company: Company { forms: &[], residual: &residual },
             rotary,
@@ -434,6 +434,8 @@ fn normal_load_errors(
 mod tests {
     use super::*;
     use crate::identify::drive::DrivePrior;
+    use crate::identify::grid::Grid;
+    use crate::identify::noise::tests::white;
     use crate::identify::two_mass::tests::swinging_disc;
 
     /// Where torsion makes most of the torque, a baseline whose noise was refitted may have another inertia than the one with which
@@ -450,5 +452,32 @@ mod tests {
         let (_, again) = extended_residual(&part, 0, &balance, &fixed);
         let [again, fitted] = [&again, &solved.residual].map(|left| balance.rms(left));
         assert!((again / fitted - 1.0).abs() < 0.01, "{again} for {fitted}");
+    }
+
+    #[test]
+    fn a_slow_log_is_foretold_with_the_standstill_of_the_training_logs() {
+        const COUNT: usize = 16_000;
+        const INERTIA_KG_M2: f64 = 0.02;
+        const NOISE_NM: f64 = 0.004;
+        // A bearing whose friction is all there from a tenth of a rad/s on.
+        let log = |fastest_rad_s: f64, seed: u64| {
+            let time: Vec<f64> = (0..COUNT).map(|i| 1e-3 * i as f64).collect();
+            let (omega, noise) = (0.5, white(COUNT, seed));
+            let torque = |(t, n): (&f64, f64)| {
+                let speed = fastest_rad_s * (omega * t).sin();
+                let inertial = INERTIA_KG_M2 * fastest_rad_s * omega * (omega * t).cos();
+                inertial + 0.4 * (speed / 0.03).tanh() + NOISE_NM * n
+            };
+            let effort = time.iter().zip(noise).map(torque).collect();
+            let position = time.iter().map(|t| -fastest_rad_s / omega * (omega * t).cos()).collect();
+            let grid = Grid::new(&time);
+            let usable = grid.covered.clone();
+            DriveLog::made("log".into(), grid, effort, position, None, None, usable, INERTIA_KG_M2)
+        };
+        let part = linear_part::search_drive(&[log(20.0, 1)], &DrivePrior::default(), true);
+        let place = part.solved.iter().position(|solved| solved.set.is_empty()).unwrap();
+        let (balance, fixed) = drive_alternatives(&part, &part.solved[place], (&[log(0.3, 2)], true), None, &[]);
+        let (left, _) = extended_residual(&part, place, &balance, &fixed);
+        assert!(balance.rms(&left) < NOISE_NM, "{}", balance.rms(&left));
     }
 }
