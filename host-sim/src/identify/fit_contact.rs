@@ -462,8 +462,9 @@ mod tests {
         let truth = model(ModelKind::Series, &numbers);
         let fit = fitted(&truth, &truth, true).unwrap();
         for (name, interval) in &fit.model.intervals {
-            let value = truth.get(name).unwrap();
-            assert!(interval.low < value && value < interval.high, "{name}: {interval:?}");
+            // Of six intervals of 95 % one misses in every fourth fit.
+            let off = (fit.model.get(name).unwrap() - truth.get(name).unwrap()) / interval.std;
+            assert!(off.abs() < 3.0, "{name}: {interval:?}");
         }
         let at = fit.names.iter().position(|name| name == "k_u_n_per_m").unwrap();
         let off = |value: f64| (value / 4e4 - 1.0).abs();
