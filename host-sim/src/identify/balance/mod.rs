@@ -168,16 +168,14 @@ pub struct LogRows<'l> {
     pub least: Vec<f64>,
 }
 
-/// Rows are taken every so many samples for each width of the filter: closer ones say the same.
-const ROWS_PER_WIDTH: f64 = 0.5;
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
 /// eighth of its largest.
 const CLEAR_WIDTHS: f64 = 2.0;
 /// Frequencies below which causes live, Hz: those of fast orders, and those of most. A bridge's noise that a converter has averaged is
 /// denser the slower it is, and what counts is its density where a cause is.
 const TEMPERED_HZ: [f64; 2] = [SLOW_HZ, 0.25 * SLOW_HZ];
-/// Rows that count as one before the residuals tell it: neighbours share most of their filter.
-const FIRST_TEMPER: f64 = 3.0;
+/// Rows that count as one before the residuals tell it: neighbours share a part of their filter.
+const FIRST_TEMPER: f64 = 1.5;
 
 /// A solved set.
 #[derive(Debug, Clone)]
@@ -250,7 +248,8 @@ impl Balance {
             }
             let marked: Vec<f64> = log.left_out.iter().map(|out| f64::from(u8::from(*out))).collect();
             let near = local_maximum(&marked, (CLEAR_WIDTHS * log.width).ceil() as usize);
-            let every = (ROWS_PER_WIDTH * log.width).round().max(1.0) as usize;
+            // A width apart: of what is faster than half of that rate the filter passes 0.7 %, so that closer rows say the same.
+            let every = log.width.round().max(1.0) as usize;
             let border = (filters::REACH * log.width).ceil() as usize;
             row_step_s = row_step_s.min(every as f64 * log.step_s);
             let rows = (border..count.saturating_sub(border)).step_by(every);

@@ -53,9 +53,9 @@ impl Effect for M2Ripple {
         let (x, r) = (picked(&positions.concat()), picked(view.company.residual));
         let effort = if efforts.is_empty() { Vec::new() } else { picked(&efforts.concat()) };
         let candidates: Vec<f64> = if view.rotary {
-            // A wave must not turn by more than a third of its period from row to row.
+            // A wave turns by less than half of its period from row to row.
             let fastest = view.scales.speed * view.balance.row_step_s;
-            (1..=HIGHEST_ORDER).map(|k| k as f64).filter(|k| k * fastest < 2.0).collect()
+            (1..=HIGHEST_ORDER).map(|k| k as f64).filter(|k| k * fastest < std::f64::consts::PI).collect()
         } else {
             waves::of_travel(x.iter().map(|x| waves::travel(x.iter().copied())).fold(0.0, f64::max), MOST_PERIODS)
         };
