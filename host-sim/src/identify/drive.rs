@@ -86,8 +86,10 @@ pub struct DriveLog {
     pub quick: [Vec<f64>; 2],
     /// Width of the filter, samples.
     pub width: f64,
-    /// Noise of the inertial torque behind the filter.
+    /// White noise of the inertial torque behind the filter.
     pub inertial_noise: Vec<f64>,
+    /// What the angle's error makes of it at worst, beside that: it may swing with a speed loop, or be motion.
+    pub inertial_swing: f64,
 }
 
 impl DriveLog {
@@ -162,12 +164,14 @@ impl DriveLog {
         let quick_acceleration = gaussian(&position, quick_width, 2).iter().map(|d| d / (dt * dt)).collect();
         let quick = [gaussian(&effort, quick_width, 0), quick_acceleration];
         let speed: Vec<f64> = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
-        let inertial_noise = if inertia.is_finite() {
-            let own = of_angle(angle_noise, curvature_passed(width, contact));
+        let (inertial_noise, inertial_swing) = if inertia.is_finite() {
+            let white = of_angle(noise::difference_deviation(&position), white_curvature(width));
+            let at_worst = of_angle(angle_noise, curvature_passed(width, contact));
             let per_speed = of_angle(jitter_s, white_curvature(width));
-            speed.iter().map(|v| own.hypot(per_speed * v)).collect()
+            let noise = speed.iter().map(|v| white.hypot(per_speed * v)).collect();
+            (noise, (at_worst.powi(2) - white.powi(2)).max(0.0).sqrt())
         } else {
-            vec![0.0; speed.len()]
+            (vec![0.0; speed.len()], 0.0)
         };
         let acceleration = gaussian(&position, width, 2).iter().map(|d| d / (dt * dt)).collect();
         Self {
@@ -185,6 +189,7 @@ impl DriveLog {
             quick,
             width,
             inertial_noise,
+            inertial_swing,
         }
     }
 
@@ -498,7 +503,7 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let guessed = move |i: usize| {
         let between = (BETWEEN_SAMPLES * effort_change[i], BETWEEN_SAMPLES * friction_change[i]);
         let folded = folded * swings[i].hypot(friction_swings[i]);
-        vec![between.0, between.1, folded, if rests[i] { of_bridge } else { 0.0 }]
+        vec![between.0, between.1, folded, log.inertial_swing, if rests[i] { of_bridge } else { 0.0 }]
     };
     // What the derivative of a Gaussian lets through of white noise.
     let passes = (0.25 / (std::f64::consts::PI.sqrt() * log.width.powi(3))).sqrt();
@@ -533,6 +538,34 @@ mod tests {
             noise(true),
             noise(false)
         );
+    }
+
+    #[test]
+    fn an_angle_that_swings_everywhere_is_as_noisy_as_it_is_from_sample_to_sample() {
+        const INERTIA_KG_M2: f64 = 0.02;
+        // A slow turn to and fro, and 12 Hz upon it: a parabola follows in no window of the angle.
+        let (slow, quick) = ((12.0, 0.5), (1e-3, std::f64::consts::TAU * 12.0));
+        let time: Vec<f64> = (0..8000).map(|i| 1e-3 * f64::from(i)).collect();
+        let count = std::f64::consts::TAU / 120_000.0;
+        let of = |t: f64, value: fn(f64, f64, f64) -> f64| {
+            [slow, quick].map(|(a, w)| value(a, w, w * t)).iter().sum::<f64>()
+        };
+        let position =
+            time.iter().map(|t| (of(*t, |a, _, x| -a * x.cos()) / count).round() * count).collect();
+        let noise = noise::tests::white(time.len(), 3);
+        let torque = |t: f64| INERTIA_KG_M2 * of(t, |a, w, x| a * w * w * x.cos());
+        let effort = time.iter().zip(noise).map(|(t, n)| torque(*t) + 0.005 * n).collect();
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        let rests = Some(vec![0.0; time.len()]);
+        let log =
+            DriveLog::made("log".into(), grid, effort, position, rests.clone(), rests, usable, INERTIA_KG_M2);
+        let logs = [log];
+        let mut balance = balance(&logs, &DrivePrior::default(), &DriveScales::new(&logs));
+        let solved = balance.solve(&[], &[]);
+        balance.refit_noise(&solved);
+        let ratio = balance.rms(&balance.deviation) / balance.rms(&solved.residual);
+        assert!((0.7..1.5).contains(&ratio), "{ratio}");
     }
 
     #[test]

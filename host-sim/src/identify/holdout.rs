@@ -476,7 +476,8 @@ mod tests {
         };
         let part = linear_part::search_drive(&[log(20.0, 1)], &DrivePrior::default(), true);
         let place = part.solved.iter().position(|solved| solved.set.is_empty()).unwrap();
-        let (balance, fixed) = drive_alternatives(&part, &part.solved[place], (&[log(0.3, 2)], true), None, &[]);
+        let (balance, fixed) =
+            drive_alternatives(&part, &part.solved[place], (&[log(0.3, 2)], true), None, &[]);
         let (left, _) = extended_residual(&part, place, &balance, &fixed);
         assert!(balance.rms(&left) < NOISE_NM, "{}", balance.rms(&left));
     }
