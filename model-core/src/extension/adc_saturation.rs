@@ -53,7 +53,7 @@ impl<T: Real> AdcSaturation<T> {
         if knee <= T::ZERO { torque_nm.at_least(low).at_most(high) } else { Self::bent(values, torque_nm) }
     }
 
-    /// The same where there is a knee. By itself, since what a control tick costs without it should not grow by its logarithms.
+    /// The same where there is a knee. By itself: within each tick's observer it would take 1 KiB more of the memory that ticks run in.
     #[inline(never)]
     fn bent(&[low, high, knee]: &[T; 3], torque_nm: T) -> T {
         // What is beyond an end, softly: of a large excess that itself, so that no exponential grows.
