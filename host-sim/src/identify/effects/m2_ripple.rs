@@ -53,7 +53,7 @@ impl Effect for M2Ripple {
         let (x, r) = (picked(&positions.concat()), picked(view.company.residual));
         let effort = if efforts.is_empty() { Vec::new() } else { picked(&efforts.concat()) };
         let candidates: Vec<f64> = if view.rotary {
-            // A wave turns by less than half of its period from row to row.
+            // At the usual speed a wave turns by less than half of its period from row to row.
             let fastest = view.scales.speed * view.balance.row_step_s;
             (1..=HIGHEST_ORDER).map(|k| k as f64).filter(|k| k * fastest < std::f64::consts::PI).collect()
         } else {
