@@ -594,6 +594,16 @@ mod tests {
     }
 
     #[test]
+    fn near_the_ends_of_a_log_no_torque_is_known_to_rest() {
+        const COUNT: usize = 1000;
+        let torque: Vec<f64> = noise::tests::white(COUNT, 5).iter().map(|n| 2.0 + 0.1 * n).collect();
+        let found = noise_at_rest(&torque, 0.1);
+        let (begin, rest) = found.split_at(SMOOTHED_OVER);
+        let (middle, end) = rest.split_at(COUNT - 2 * SMOOTHED_OVER);
+        assert!(begin.iter().chain(end).all(|x| *x == 0.0) && (rms(middle) / 0.1 - 1.0).abs() < 0.2);
+    }
+
+    #[test]
     fn a_noisy_bridge_is_a_quiet_one_where_its_torque_rests() {
         // The torque rests in the first half and swings in the second.
         const COUNT: usize = 8000;
