@@ -7,14 +7,16 @@
 //! root's way makes z uncertain: where the contact slides that is not at all, at rest it may be all.
 //! Left out: what the root did between samples.
 
+use wide::f64x4;
+
 use super::law::Contact;
 use super::observer::{Drive, Observed, SLIP_NOISES, least_load_n};
 
 /// Over so many of the bristles' own ways nothing is left of where they were, e⁻³⁷ < 2⁻⁵³.
 const FORGOTTEN: f64 = 37.0;
-/// Points of Gauss and Hermite over the noise of the way: deviations from the mean, and weights.
-const WAYS: [(f64, f64); 3] =
-    [(0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0), (-1.732_050_807_568_877_2, 1.0 / 6.0)];
+/// Points of Gauss and Hermite over the noise of the way: deviations from the mean, and weights; the fourth is none.
+const OFF: [f64; 4] = [0.0, 1.732_050_807_568_877_2, -1.732_050_807_568_877_2, 0.0];
+const WEIGHTS: [f64; 4] = [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0, 0.0];
 
 /// Runs over a log.
 pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
@@ -29,6 +31,7 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let mut held_n = force[0];
     let mut variance = channel;
     let mut age = contact.ageing.map(|ageing| ageing.first_age_s);
+    let off = f64x4::from(OFF) * f64x4::splat(speed_noise * dt);
     for i in 1..n {
         let way = drive.root_m[i] - drive.root_m[i - 1];
         let v = 0.5 * (way + drive.root_m[(i + 1).min(n - 1)] - drive.root_m[i.min(n - 2)]) / dt;
@@ -48,19 +51,15 @@ pub(super) fn follow(contact: &Contact, drive: &Drive<'_>) -> Observed {
         limit *= contact.curve.at(speed);
 
         // The bristles, and how the noise of the way makes them uncertain: over a reversal it is the direction itself.
-        let follow = |way: f64| {
-            let target = limit.copysign(way);
-            let ways = way.abs() * k / limit;
-            let left = if ways < FORGOTTEN { (-ways).exp() } else { 0.0 };
-            (target + (held_n - target) * left, left)
-        };
-        let (still, left) = follow(way);
-        let points = WAYS.map(|(off, weight)| {
-            (if off == 0.0 { still } else { follow(way + off * speed_noise * dt).0 }, weight)
-        });
-        let mean: f64 = points.iter().map(|(at, weight)| weight * at).sum();
-        let spread: f64 = points.iter().map(|(at, weight)| weight * (at - mean).powi(2)).sum();
-        variance = left * left * variance + spread;
+        let ways = f64x4::splat(way) + off;
+        let target = f64x4::splat(limit).copysign(ways);
+        let left = (ways.abs() * f64x4::splat(-k / limit)).max(f64x4::splat(-FORGOTTEN)).exp();
+        let points = target + (f64x4::splat(held_n) - target) * left;
+        let weights = f64x4::from(WEIGHTS);
+        let mean = (weights * points).reduce_add();
+        let off_mean = points - f64x4::splat(mean);
+        let [left, ..] = left.to_array();
+        variance = left * left * variance + (weights * off_mean * off_mean).reduce_add();
         held_n = mean;
 
         let direction = 1f64.copysign(way);

@@ -178,7 +178,7 @@ impl<'a> SensorChain for Channel<'a> {
 
     fn clip(&mut self, torque_nm: Self::Signal) -> Self::Signal {
         let Some(ends) = self.ends_nm else { return torque_nm };
-        changed(torque_nm, |torque| torque.iter_mut().for_each(|t| *t = ends.shown(*t)))
+        changed(torque_nm, |torque| ends.show(torque))
     }
 }
 
@@ -187,7 +187,7 @@ impl<'a> SensorUndo for Channel<'a> {
 
     fn before_clip(&mut self, shown_nm: Self::Signal) -> Self::Signal {
         let Some(ends) = self.ends_nm.filter(Ends::bend) else { return shown_nm };
-        changed(shown_nm, |shown| shown.iter_mut().for_each(|s| *s = ends.acts(*s)))
+        changed(shown_nm, |shown| ends.act(shown))
     }
 
     fn before_delay(&mut self, shown_nm: Self::Signal) -> Self::Signal {

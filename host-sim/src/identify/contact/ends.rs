@@ -4,9 +4,22 @@
 //! there on noise is all that it would show.
 
 use model_core::extension::adc_saturation::AdcSaturation;
+use wide::f64x4;
 
 /// The smallest slope of the channel that is worth a way back.
 const LEAST_SLOPE: f64 = 0.2;
+
+/// So many knees from an end nothing is bent: e^−37 is less than a last digit.
+const STRAIGHT: f64 = 37.0;
+
+/// Changes each of these values.
+fn in_lanes(values: &mut [f64], of: impl Fn(f64x4) -> f64x4) {
+    for some in values.chunks_mut(4) {
+        let mut four = [0.0; 4];
+        four[..some.len()].copy_from_slice(some);
+        some.copy_from_slice(&of(f64x4::from(four)).to_array()[..some.len()]);
+    }
+}
 
 /// Ends of a range, in the unit of what is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +27,8 @@ pub struct Ends {
     low: f64,
     high: f64,
     knee: f64,
+    /// What is shown where the channel follows by a fifth, on either side.
+    told: (f64, f64),
 }
 
 impl Ends {
@@ -24,7 +39,8 @@ impl Ends {
 
     /// With a knee so wide, a small part of the range.
     pub fn with_knee((low, high): (f64, f64), knee: f64) -> Self {
-        Self { low, high, knee }
+        let near = -knee * (1.0 - LEAST_SLOPE).ln();
+        Self { low, high, knee, told: (low + near, high - near) }
     }
 
     /// Lower and upper end.
@@ -37,6 +53,20 @@ impl Ends {
         self.knee > 0.0
     }
 
+    /// What is shown of these values, in their place: [`Self::shown`] but for its last digits, some at once.
+    pub fn show(&self, values: &mut [f64]) {
+        if !self.bend() {
+            return values.iter_mut().for_each(|x| *x = self.shown(*x));
+        }
+        let knee = f64x4::splat(self.knee);
+        let beyond = |excess: f64x4| {
+            let small = (-(excess / knee).abs()).max(f64x4::splat(-STRAIGHT)).exp();
+            excess.max(f64x4::ZERO) + knee * (small + f64x4::ONE).ln()
+        };
+        let [low, high] = [self.low, self.high].map(f64x4::splat);
+        in_lanes(values, |acts| acts + beyond(low - acts) - beyond(acts - high));
+    }
+
     /// What is shown of a value.
     pub fn shown(&self, acts: f64) -> f64 {
         AdcSaturation::shown(&[self.low, self.high, self.knee], acts)
@@ -44,19 +74,32 @@ impl Ends {
 
     /// What is shown where the channel follows by a fifth, on either side.
     pub fn told_between(&self) -> (f64, f64) {
-        let near = -self.knee * (1.0 - LEAST_SLOPE).ln();
-        (self.low + near, self.high - near)
+        self.told
     }
 
-    /// What acts where this is shown; further out as much more as is shown more.
-    pub fn acts(&self, shown: f64) -> f64 {
+    /// What acts where these are shown, in their place; further out as much more as is shown more.
+    pub fn act(&self, values: &mut [f64]) {
         if !self.bend() {
-            return shown;
+            return;
         }
-        let (low, high) = self.told_between();
-        let told = shown.max(low).min(high);
-        let held_back = |inside: f64| -self.knee * (-(-inside / self.knee).exp()).ln_1p();
-        shown + held_back(self.high - told) - held_back(told - self.low)
+        let knee = f64x4::splat(self.knee);
+        let held_back = |inside: f64x4| {
+            let small = (-inside / knee).max(f64x4::splat(-STRAIGHT)).exp();
+            -knee * (f64x4::ONE - small).ln()
+        };
+        let [low, high] = [self.low, self.high].map(f64x4::splat);
+        let told = [self.told.0, self.told.1].map(f64x4::splat);
+        in_lanes(values, |shown| {
+            let at = shown.max(told[0]).min(told[1]);
+            shown + held_back(high - at) - held_back(at - low)
+        });
+    }
+
+    /// The same of one value.
+    pub fn acts(&self, shown: f64) -> f64 {
+        let mut one = [shown];
+        self.act(&mut one);
+        one[0]
     }
 }
 
@@ -73,6 +116,22 @@ mod tests {
         assert_eq!(ends.told_between(), (-2.0, 3.0));
         let one = Ends::hard((f64::NEG_INFINITY, 0.5));
         assert_eq!([one.shown(-9.0), one.shown(9.0)], [-9.0, 0.5]);
+    }
+
+    #[test]
+    fn many_values_are_shown_as_each_is() {
+        for ends in [
+            Ends::hard((-2.0, 3.0)),
+            Ends::with_knee((-2.0, 3.0), 0.2),
+            Ends::with_knee((f64::NEG_INFINITY, 3.0), 0.01),
+        ] {
+            let values: Vec<f64> = (-50..=51).map(|step| 0.1 * f64::from(step)).collect();
+            let mut shown = values.clone();
+            ends.show(&mut shown);
+            for (shown, acts) in shown.iter().zip(&values) {
+                assert!((shown - ends.shown(*acts)).abs() < 1e-12, "{acts}: {shown}");
+            }
+        }
     }
 
     #[test]

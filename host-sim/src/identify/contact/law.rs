@@ -10,6 +10,8 @@ const OCTAVES: usize = 25;
 const CELL_BITS: u32 = 5;
 /// What stands behind them.
 const REST_BITS: u32 = f64::MANTISSA_DIGITS - 1 - CELL_BITS;
+/// The first cell, by the leading bits of its speeds.
+const FIRST_CELL: u64 = SLOWEST_M_S.to_bits() >> REST_BITS;
 /// Entries: standstill, then the edges of the cells.
 const ENTRIES: usize = (OCTAVES << CELL_BITS) + 2;
 
@@ -17,23 +19,32 @@ const ENTRIES: usize = (OCTAVES << CELL_BITS) + 2;
 #[derive(Debug, Clone)]
 pub struct Curve {
     values: Vec<f64>,
+    /// Slope of each cell, 1/(m/s).
+    slopes: Vec<f64>,
 }
 
 /// Slip speeds of the table's entries, m/s.
 pub fn speeds() -> impl Iterator<Item = f64> {
-    let edge = |cell: u64| f64::from_bits(((SLOWEST_M_S.to_bits() >> REST_BITS) + cell) << REST_BITS);
+    let edge = |cell: u64| f64::from_bits((FIRST_CELL + cell) << REST_BITS);
     std::iter::once(0.0).chain((0..ENTRIES as u64 - 1).map(edge))
 }
 
 impl Curve {
     /// The table of a curve.
     pub fn new(curve: impl Fn(f64) -> f64) -> Self {
-        Self { values: speeds().map(curve).collect() }
+        Self::of(speeds().map(curve).collect())
+    }
+
+    fn of(values: Vec<f64>) -> Self {
+        let edge = |cell: u64| f64::from_bits((FIRST_CELL + cell) << REST_BITS);
+        let rises = values[1..].windows(2).map(|g| g[1] - g[0]);
+        let slopes = rises.zip(0..).map(|(rise, cell)| rise / (edge(cell + 1) - edge(cell))).collect();
+        Self { values, slopes }
     }
 
     /// Multiplied with e^m(w), m given at [`speeds`].
     pub fn scale(&mut self, log_factor: &[f64]) {
-        self.values.iter_mut().zip(log_factor).for_each(|(g, m)| *g *= m.exp());
+        *self = Self::of(self.values.iter().zip(log_factor).map(|(g, m)| g * m.exp()).collect());
     }
 
     /// g(w)
@@ -43,7 +54,7 @@ impl Curve {
             return self.values[0] + (self.values[1] - self.values[0]) * slip_m_s / SLOWEST_M_S;
         }
         let bits = slip_m_s.to_bits();
-        let cell = ((bits >> REST_BITS) - (SLOWEST_M_S.to_bits() >> REST_BITS)) as usize;
+        let cell = ((bits >> REST_BITS) - FIRST_CELL) as usize;
         if cell + 2 >= ENTRIES {
             return self.at_speed();
         }
@@ -59,17 +70,13 @@ impl Curve {
     /// g(w), and g′(w) within a cell of the table, 1/(m/s).
     #[inline]
     pub fn at_with_derivative(&self, slip_m_s: f64) -> (f64, f64) {
-        let first = SLOWEST_M_S.to_bits() >> REST_BITS;
         let bits = slip_m_s.max(SLOWEST_M_S).to_bits() >> REST_BITS;
-        let cell = (bits - first) as usize;
-        if cell + 2 >= ENTRIES {
-            return (self.at_speed(), 0.0);
-        }
-        let [edge, next] = [bits, bits + 1].map(|bits| f64::from_bits(bits << REST_BITS));
-        let derivative = (self.values[cell + 2] - self.values[cell + 1]) / (next - edge);
+        let cell = (bits - FIRST_CELL) as usize;
+        let Some(&derivative) = self.slopes.get(cell) else { return (self.at_speed(), 0.0) };
         if slip_m_s <= SLOWEST_M_S {
             return (self.at(slip_m_s), derivative);
         }
+        let edge = f64::from_bits(bits << REST_BITS);
         (self.values[cell + 1] + derivative * (slip_m_s - edge), derivative)
     }
 
@@ -96,14 +103,14 @@ pub struct Ageing {
 impl Ageing {
     /// Friction over that of a fresh contact.
     pub fn factor(&self, age_s: f64) -> f64 {
-        1.0 + self.growth * (age_s / self.onset_s).ln_1p()
+        1.0 + self.growth * (1.0 + age_s / self.onset_s).ln()
     }
 
     /// Age after a step of slip at this speed.
     pub fn renewed(&self, age_s: f64, slip_m_s: f64, step_s: f64) -> f64 {
         let share = slip_m_s * step_s / self.renewal_m;
         if share > 1e-6 {
-            let lost = -(-share).exp_m1();
+            let lost = 1.0 - (-share).exp();
             age_s * (1.0 - lost) + step_s * lost / share
         } else {
             age_s + step_s

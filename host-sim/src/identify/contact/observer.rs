@@ -310,12 +310,14 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     // Of a force beyond the end of the range it is known that it is friction, until the block has forgotten it.
     let forgets = block.transition[(0, 0)].powi(2);
     let mut lost = f64::from(u8::from(drive.at_end(0)));
-    let seen_by = |lost: f64, load: f64| at_rest + lost * (load * coulomb / force_noise_n).powi(2);
+    let noises_of_load = coulomb / force_noise_n;
+    let seen_by = |lost: f64, load: f64| at_rest + lost * (load * noises_of_load).powi(2);
     let mut variance = seen_by(lost, drive.load_n[0]);
     let branch = contact.branches.map(|(_, time_s)| 1.0 / (1.0 + dt / time_s.max(1e-6)));
     let (mut held_m, mut held_branches_m) = (ways.block_m[0], ways.branches_m(0));
     let mut age = contact.ageing.map_or(0.0, |a| a.first_age_s);
     let (per_load, film) = contact.viscous;
+    let per_damping = c.recip();
     let most = drive.smoothed.iter().copied().max().map_or(0, usize::from);
     let own_noise: Option<Vec<OwnNoise>> = (c > 0.0).then(|| {
         let of_width = |(further, _)| OwnNoise::new(&block, contact, dt, drive.late, further);
@@ -350,7 +352,8 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let (coefficient, derivative) = contact.curve.at_with_derivative(speed);
             let viscous = per_load * load + film;
             if let Some(own) = &own_noise {
-                out.own_noise[i] += slips * (own[place].left(-(loaded * derivative + viscous) / c) - 1.0);
+                out.own_noise[i] +=
+                    slips * (own[place].left(-(loaded * derivative + viscous) * per_damping) - 1.0);
             }
             1f64.copysign(w) * (loaded * coefficient + viscous * speed)
         } else {
@@ -376,12 +379,14 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             let mut breaks = 0.0;
             if over > -SATURATED {
                 // At rest bristles hold more than F_N g(0) until the motion goes in the force's direction: winding down is no slip.
-                let beyond = if over > SATURATED {
-                    sticking.abs() - limit
+                let (share, beyond) = if over > SATURATED {
+                    (1.0, sticking.abs() - limit)
                 } else {
-                    LIMIT_WIDTH * limit * over.exp().ln_1p()
+                    let small = (-over.abs()).exp();
+                    let share = if over > 0.0 { 1.0 } else { small } / (1.0 + small);
+                    (share, LIMIT_WIDTH * limit * (over.max(0.0) + (1.0 + small).ln()))
                 };
-                breaks = sigmoid(over) * towards;
+                breaks = share * towards;
                 sticking -= sticking.signum() * beyond * towards;
             }
             if let Some(loose) = &loose {
@@ -413,8 +418,9 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
             out.force_n[i] = sliding;
         }
         if let Some(ageing) = contact.ageing {
-            let aged = ageing.renewed(age, speed, dt);
-            age = out.sliding[i] * aged + (1.0 - out.sliding[i]) * (age + dt);
+            let slid = out.sliding[i];
+            let aged = if slid > NEGLIGIBLE { slid * ageing.renewed(age, speed, dt) } else { 0.0 };
+            age = aged + (1.0 - slid) * (age + dt);
         }
     }
     out
@@ -466,6 +472,7 @@ fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, thresholds: &[f6
     let by_speed: Vec<f64> = thresholds.iter().map(|threshold| steep / threshold).collect();
     let by_share = steep / LEAST_SHARE;
     let by_force = steep / (LEAST_FORCE * coulomb);
+    let saturated = steep + SATURATED;
     for i in 1..motion.root_m.len() {
         let w = out.slip_m_s[i];
         let speed = w.abs();
@@ -474,12 +481,13 @@ fn slides(motion: &Motion<'_>, drive: &Drive<'_>, coulomb: f64, thresholds: &[f6
         out.sliding[i] = if fast < -SATURATED {
             0.0
         } else {
-            let share = by_share * speed / (motion.root_m_s(i).abs() + 1e-3 * thresholds[place]) - steep;
-            let resisting = by_force * drive.force_n[i] * 1f64.copysign(w) / drive.load_n[i] - steep;
-            if fast.min(share).min(resisting) > SATURATED {
+            let (slip, root) = (by_share * speed, motion.root_m_s(i).abs() + 1e-3 * thresholds[place]);
+            let (force, load) = (by_force * drive.force_n[i] * 1f64.copysign(w), drive.load_n[i]);
+            // The most frequent answer without a division.
+            if fast > SATURATED && slip > saturated * root && force > saturated * load && load > 0.0 {
                 1.0
             } else {
-                sigmoid(fast) * sigmoid(share) * sigmoid(resisting)
+                sigmoid(fast) * sigmoid(slip / root - steep) * sigmoid(force / load - steep)
             }
         };
     }

@@ -38,7 +38,7 @@ pub(super) fn innovations(
             c * c * p11 + 2.0 * c * d * p12 + d * d * p22 + v * v * q,
         ]
     };
-    let omega = std::f64::consts::TAU * hz;
+    let per_omega = (std::f64::consts::TAU * hz).recip();
     for (((r, q), all), used) in residual.iter_mut().zip(of_force).zip(of_all).zip(used) {
         (x, y) = (a * x + b * y, c * x + d * y);
         struck = on(struck, *q);
@@ -51,9 +51,12 @@ pub(super) fn innovations(
             p22 -= l * p12;
             p12 -= k * p12;
             p11 -= k * p11;
-            let within = MOST_DEVIATIONS * struck[0].max(0.0).sqrt()
-                / (x * x + (y / omega).powi(2)).sqrt().max(f64::MIN_POSITIVE);
-            (x, y) = (x * within.min(1.0), y * within.min(1.0));
+            let (size, most) =
+                (x * x + (y * per_omega).powi(2), MOST_DEVIATIONS.powi(2) * struck[0].max(0.0));
+            if size > most {
+                let within = (most / size).sqrt();
+                (x, y) = (x * within, y * within);
+            }
         }
         known = [p11, p12, p22];
     }
