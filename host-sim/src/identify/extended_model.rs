@@ -15,6 +15,7 @@ use super::contact_part::ContactPart;
 use super::fit_contact::{self, Begin};
 use super::fit_interval::Linearised;
 use super::judge::Judgement;
+use super::linear::Slope;
 use super::linear_part::Linear;
 use super::table::Part;
 use super::{effects, fit_parameters};
@@ -54,7 +55,7 @@ pub struct FittedLaws {
     /// The fit.
     pub fit: Fit,
     /// Slopes of its residuals (negative), a column for each value.
-    pub columns: Vec<Vec<f64>>,
+    pub columns: Vec<Slope>,
     /// Covariance of its values.
     pub covariance: DMatrix<f64>,
 }

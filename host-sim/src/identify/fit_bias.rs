@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contact::log::ContactLog;
-use super::contact::problem::{Baseline, Fit, Numbers, Problem};
+use super::contact::problem::{Baseline, Fit, Near, Numbers, Problem};
 use super::fit_parameters::{set_all, values};
 use super::linear::factor;
 use super::noise::{White, standard_deviation};
@@ -105,7 +105,7 @@ impl Resimulated<'_> {
             let problem = Problem::new(&logs, self.baseline, &[]);
             let noise = problem.noise_at(&[], p).fitted_as(&logs, &measured.noise);
             let problem = Problem::with_noise(&logs, self.baseline, &[], noise);
-            Ok(DVector::from_vec(problem.fit(&[], p.to_vec(), STEPS, None).p))
+            Ok(DVector::from_vec(problem.fit(&[], p.to_vec(), STEPS, Near::Nothing).p))
         };
         let (plus, minus) = rayon::join(|| optimum(1.0), || optimum(-1.0));
         Ok(0.5 * (plus? + minus?) - DVector::from_column_slice(p))

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contact::log::ContactLog;
-use super::contact::problem::{Baseline, DRIFT, Fit, Problem, Role};
+use super::contact::problem::{Baseline, DRIFT, Fit, Near, Problem, Role};
 use super::contact::smoothing::OBSERVED_OVER;
 use super::filters::rms;
 use super::fit_bias::Resimulated;
@@ -142,13 +142,13 @@ fn starts(baseline: &Baseline, begin: Begin) -> Vec<Vec<f64>> {
 
 /// Gauss–Newton with fresh slopes until it gains nothing.
 fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, progress: &(dyn Fn() + Sync)) -> Fit {
-    let mut best = problem.fit(&[], start, STEPS, None);
+    let mut best = problem.fit(&[], start, STEPS, Near::Nothing);
     if let Some(better) = problem.better_static(&best) {
-        best = problem.fit(&[], better, STEPS, None);
+        best = problem.fit(&[], better, STEPS, Near::Nothing);
     }
     for _ in 1..rounds {
         progress();
-        let next = problem.fit(&[], best.p.clone(), STEPS, None);
+        let next = problem.fit(&[], best.p.clone(), STEPS, Near::Nothing);
         let gained = best.cost - next.cost;
         best = next;
         if gained < CONVERGED {

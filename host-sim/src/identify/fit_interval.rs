@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::contact::log::ContactLog;
 use super::contact::problem::{FREEDOM, Fit, Problem};
-use super::linear;
+use super::linear::{self, Slope};
 use super::slow_noise::Errors;
 use crate::fit::covariance::BLOCKS;
 
@@ -41,7 +41,7 @@ pub(super) struct Known {
 
 /// Residuals and columns −∂r/∂p of a fit, all logs on end, whitened as far as the noise is.
 pub(super) struct Linearised<'a> {
-    columns: Cow<'a, [Vec<f64>]>,
+    columns: Cow<'a, [Slope]>,
     /// Residuals over their deviations; 0 where a sample takes no part.
     r: Cow<'a, [f64]>,
     /// The deviations, N m.
@@ -54,7 +54,7 @@ pub(super) struct Linearised<'a> {
 
 impl<'a> Linearised<'a> {
     /// About a fit.
-    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit, columns: &'a [Vec<f64>]) -> Self {
+    pub(super) fn new(problem: &'a Problem<'_>, fit: &'a Fit, columns: &'a [Slope]) -> Self {
         Self {
             columns: problem.noise.whitened_columns(columns),
             r: problem.noise.whitened(&fit.r),
@@ -112,7 +112,7 @@ impl<'a> Linearised<'a> {
 /// Samples that count as one to what is fitted: tr(V₀⁻¹V)/n, V the variance of the score from blocks and V₀ that of samples
 /// that are independent (Pauli, Racugno and Ventura 2011 scale a composite likelihood so). An error that repeats itself, as
 /// that of a swing between two samples does, has no slow part and yet says the same again and again.
-pub(super) fn repeated(columns: &[Vec<f64>], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> f64 {
+pub(super) fn repeated(columns: &[Slope], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> f64 {
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let scaled: Vec<Vec<f64>> =
@@ -154,7 +154,7 @@ mod tests {
     fn an_error_that_repeats_itself_counts_as_few_samples() {
         let n = 8000;
         let lengths = [n];
-        let swing: Vec<f64> = (0..n).map(|i| (2.2 * i as f64).sin()).collect();
+        let swing: Slope = (0..n).map(|i| (2.2 * i as f64).sin()).collect();
         let of = |r: &[f64]| repeated(std::slice::from_ref(&swing), r, &lengths, &[1.0]);
         let white = noise(n, 5);
         // Forty blocks know a variance within 22 %, one deviation.
@@ -169,7 +169,7 @@ mod tests {
     }
 
     /// Of residuals of deviation 1 in one log that slides throughout.
-    fn of(columns: &[Vec<f64>], r: &[f64], prior_sd: &[f64]) -> Known {
+    fn of(columns: &[Slope], r: &[f64], prior_sd: &[f64]) -> Known {
         let deviation_nm = &vec![1.0; r.len()];
         let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
         Linearised { columns: columns.into(), r: r.into(), deviation_nm, slides, lengths }.known(prior_sd)
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn the_mean_of_white_noise_has_its_own_deviation() {
         let n = 8000;
-        let c = of(&[vec![1.0; n]], &noise(n, 3), &[1.0]).covariance;
+        let c = of(&[vec![1.0; n].into()], &noise(n, 3), &[1.0]).covariance;
         // Forty blocks know a variance within 22 %, one deviation; Student's weights cost 1/0.93 on normal noise.
         let ratio = c[(0, 0)] * n as f64;
         assert!((0.5..1.8).contains(&ratio), "{ratio}");
@@ -192,7 +192,7 @@ mod tests {
             let wave = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin();
             let r: Vec<f64> =
                 noise(n, 3).iter().enumerate().map(|(i, x)| 0.1 + x + swing * wave(i)).collect();
-            of(&[vec![1.0; n]], &r, &[1.0])
+            of(&[vec![1.0; n].into()], &r, &[1.0])
         };
         let (quiet, swings) = (of(0.0), of(0.5));
         let grows = swings.covariance[(0, 0)] / quiet.covariance[(0, 0)];
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn what_changes_nothing_is_as_uncertain_as_its_prior() {
         let n = 2000;
-        let c = of(&[vec![1.0; n], vec![0.0; n]], &noise(n, 5), &[1.0, 0.7]).covariance;
+        let c = of(&[1.0, 0.0].map(|x| vec![x; n].into()), &noise(n, 5), &[1.0, 0.7]).covariance;
         assert!((c[(1, 1)].sqrt() - 0.7).abs() < 1e-9, "{c}");
     }
 }

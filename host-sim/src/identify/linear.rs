@@ -1,8 +1,13 @@
 //! Symmetric positive definite systems, and least squares with bounds from below.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use wide::f64x4;
+
+/// Slopes of residuals (negative) along one parameter; what moves it little shares it.
+pub type Slope = Arc<[f64]>;
 
 /// The Cholesky factor of a matrix; where rounding has made it indefinite a ridge is added that grows until it is not.
 pub fn factor(matrix: &DMatrix<f64>) -> Cholesky<f64, Dyn> {
@@ -170,18 +175,18 @@ pub fn weighted_products<C: AsRef<[f64]>>(j: &[C], w: &[f64], r: &[f64]) -> impl
 
 /// Slopes of residuals (negative, a column for each parameter) mended by what a step made of the residuals: the least change,
 /// each parameter in its own width, with which they would have told it (C. G. Broyden, *Mathematics of Computation* 19, 1965).
-pub fn mend_slopes(columns: &mut [Vec<f64>], [before, after]: [&[f64]; 2], step: &[f64], widths: &[f64]) {
+pub fn mend_slopes(columns: &mut [Slope], [before, after]: [&[f64]; 2], step: &[f64], widths: &[f64]) {
     let size: f64 = step.iter().zip(widths).map(|(d, width)| (d / width).powi(2)).sum();
     if size == 0.0 {
         return;
     }
     let mut untold: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
     for (column, d) in columns.iter().zip(step) {
-        untold.iter_mut().zip(column).for_each(|(untold, slope)| *untold -= d * slope);
+        untold.iter_mut().zip(column.iter()).for_each(|(untold, slope)| *untold -= d * slope);
     }
     for (column, (d, width)) in columns.iter_mut().zip(step.iter().zip(widths)) {
         let share = d / (width * width) / size;
-        column.iter_mut().zip(&untold).for_each(|(slope, untold)| *slope += share * untold);
+        Arc::make_mut(column).iter_mut().zip(&untold).for_each(|(slope, untold)| *slope += share * untold);
     }
 }
 
@@ -226,13 +231,12 @@ mod tests {
         let residual = |p: [f64; 2]| vec![1.0 - p[0] - 0.3 * p[0] * p[0], 2.0 - 4.0 * p[1], p[0] * p[1]];
         let [from, to] = [[0.2, 0.1], [0.5, -0.1]];
         let (before, after) = (residual(from), residual(to));
-        let mut columns = vec![vec![1.0, 0.2, -0.1], vec![0.1, 3.0, -0.2]];
+        let mut columns: Vec<Slope> = vec![[1.0, 0.2, -0.1].into(), [0.1, 3.0, -0.2].into()];
         let (step, widths) = ([to[0] - from[0], to[1] - from[1]], [2.0, 0.5]);
         // Across the step as the widths measure it.
         let across = [step[1] / (widths[1] * widths[1]), -step[0] / (widths[0] * widths[0])];
-        let told = |columns: &[Vec<f64>], step: [f64; 2], i: usize| {
-            columns[0][i] * step[0] + columns[1][i] * step[1]
-        };
+        let told =
+            |columns: &[Slope], step: [f64; 2], i: usize| columns[0][i] * step[0] + columns[1][i] * step[1];
         let of_across: Vec<f64> = (0..3).map(|i| told(&columns, across, i)).collect();
         mend_slopes(&mut columns, [&before, &after], &step, &widths);
         for i in 0..3 {

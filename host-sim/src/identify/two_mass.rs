@@ -10,12 +10,12 @@
 use rayon::prelude::*;
 
 use super::balance::{Alternative, Balance, DiscMotion, Weighed};
-use super::contact::problem::{KEPT_PROMISE, student_weight};
+use super::contact::problem::{KEPT_PROMISE, MENDED_PROMISE, UNDECIDED, student_weight};
 use super::coupling::{Coupling, Law};
 use super::drive::{Bearing, DriveLog, INERTIA};
 use super::effects::DriveView;
 use super::evidence::BALANCE_SHARE;
-use super::linear;
+use super::linear::{self, Slope};
 use super::term::Parameter;
 
 /// A mode turns by less than this in a step within a sample, rad: its frequency is then right to φ²/24, 6e-4.
@@ -61,6 +61,7 @@ fn shaft_torque(
     let (disc, omega, k) = (law.disc_inertia, law.omega_rad_s, law.stiffness);
     let substeps = (omega * dt / TURN_IN_A_STEP).ceil().max(1.0) as usize;
     let h = dt / substeps as f64;
+    let (per_step, per_substep, per_stiffness) = (dt.recip(), (substeps as f64).recip(), k.recip());
     let (per_torque, slower) = (h / disc, bearing.slower(h, disc));
     let pull = pull.min(SLOWER_THAN_MODE * omega * dt);
     let free = vec![0.0; n];
@@ -81,18 +82,18 @@ fn shaft_torque(
     let mut out = vec![0.0; n];
     let mut disc_position = vec![q; n];
     for i in 1..n {
-        let (before, now) =
-            ((x[i] - x[i - 1]) / dt, if i + 1 < n { (x[i + 1] - x[i]) / dt } else { (x[i] - x[i - 1]) / dt });
-        let earlier = if i > 1 { (x[i - 1] - x[i - 2]) / dt } else { before };
+        let before = (x[i] - x[i - 1]) * per_step;
+        let now = if i + 1 < n { (x[i + 1] - x[i]) * per_step } else { before };
+        let earlier = if i > 1 { (x[i - 1] - x[i - 2]) * per_step } else { before };
         let (va, vb) = (0.5 * (earlier + before), 0.5 * (before + now));
         // What the bearing makes beside the friction that follows the disc's speed.
         let borne = on_disc * (bearing_nm[i] - bearing.friction_nm(log.speed[i]));
         for s in 0..substeps {
             // Drift, kick, drift: motor and disc are seen at the same instant, in the middle of the step.
-            let part = (s as f64 + 0.5) / substeps as f64;
+            let part = (s as f64 + 0.5) * per_substep;
             let (motor, rate) = between([x[i - 1], x[i]], [dt * va, dt * vb], part);
             q += 0.5 * h * w;
-            let shaft = law.torque(motor - q, rate / dt - w);
+            let shaft = law.torque(motor - q, rate * per_step - w);
             let rubbed = friction[i - 1] + (friction[i] - friction[i - 1]) * part;
             w += per_torque * (shaft - rubbed - borne);
             if on_disc > 0.0 {
@@ -104,14 +105,14 @@ fn shaft_torque(
         out[i] = law.torque(twist, vb - w);
         // In the gap the torque does not say where the disc is, but that it is at the other end where the motor says so.
         let off = if law.slope(twist) > STIFF {
-            (out[i] - observed[i]) / k
+            (out[i] - observed[i]) * per_stiffness
         } else if law.is_play() && observed[i].abs() > sure {
-            twist - observed[i] / k - observed[i].signum() * law.half_gap
+            twist - observed[i] * per_stiffness - observed[i].signum() * law.half_gap
         } else {
             0.0
         };
         q += pull * off;
-        w += SPEED_PULL * pull * off / dt;
+        w += SPEED_PULL * pull * off * per_step;
         if !q.is_finite() || !w.is_finite() || q.abs() > 1e9 {
             return (vec![f64::NAN; n], disc_position);
         }
@@ -328,7 +329,7 @@ fn refined(
     let mut best = start;
     let mut log_occam = None;
     let mut damping = 1e-2;
-    let mut slopes: Option<Vec<Vec<f64>>> = None;
+    let mut slopes: Option<Vec<Slope>> = None;
     for _ in 0..ITERATIONS {
         let p = best.numbers.fitted();
         let r = &best.seen.innovations;
@@ -372,9 +373,10 @@ fn refined(
             }
             continue;
         };
-        if gained > KEPT_PROMISE * promised {
-            // Over play the likelihood is rough: what one step makes of it is no slope.
-            if !there.numbers.is_play() {
+        // Over play the likelihood is rough: what one step makes of it is no slope.
+        let mends = !there.numbers.is_play();
+        if gained > if mends { MENDED_PROMISE } else { KEPT_PROMISE } * promised {
+            if mends {
                 let ratios = vec![1.0; step.len()];
                 linear::mend_slopes(&mut columns, [r, &there.seen.innovations], step.as_slice(), &ratios);
             }
@@ -382,8 +384,7 @@ fn refined(
         }
         best = there;
         damping = (0.3 * damping).max(1e-4);
-        // Half a unit of the likelihood itself changes no decision.
-        if gained < 0.5 * BALANCE_SHARE && (fresh || slopes.is_some()) {
+        if gained < UNDECIDED * BALANCE_SHARE && (fresh || slopes.is_some()) {
             break;
         }
     }

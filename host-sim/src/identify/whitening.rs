@@ -11,6 +11,8 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 use wide::f64x4;
 
+use super::linear::Slope;
+
 /// Time constants of the processes, s: a decade apart, from what the effective sample size counts to a log's length.
 const LONG_S: [f64; SLOW] = [0.05, 0.5, 5.0, 50.0];
 /// Processes.
@@ -176,12 +178,12 @@ impl Whitening {
     }
 
     /// The same of columns.
-    pub(super) fn of_relative_columns(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let of_lanes = |lanes: &[Vec<f64>]| {
+    pub(super) fn of_relative_columns(&self, columns: &[Slope]) -> Vec<Slope> {
+        let of_lanes = |lanes: &[Slope]| {
             let mut out: Vec<Vec<f64>> = lanes.iter().map(|column| vec![0.0; column.len()]).collect();
             let value = |lane: usize, row: &Row| lanes[lane][row.point] * row.white;
             self.innovations(lanes.len(), value, |lane, row, innovation| out[lane][row.point] = innovation);
-            out
+            out.into_iter().map(Slope::from)
         };
         columns.par_chunks(LANES).flat_map_iter(of_lanes).collect()
     }
@@ -283,7 +285,8 @@ mod tests {
         let columns: Vec<Vec<f64>> = (0..6).map(column).collect();
         let each: Vec<Vec<f64>> = columns.iter().map(|column| whitening.of(column)).collect();
         assert_eq!(whitening.of_columns(&columns.iter().collect::<Vec<_>>()), each);
-        let each: Vec<Vec<f64>> = columns.iter().map(|column| whitening.of_relative(column)).collect();
+        let each: Vec<Slope> = columns.iter().map(|column| whitening.of_relative(column).into()).collect();
+        let columns: Vec<Slope> = columns.into_iter().map(Slope::from).collect();
         assert_eq!(whitening.of_relative_columns(&columns), each);
     }
 

@@ -23,6 +23,7 @@ use super::log::ContactLog;
 use super::problem::{FREEDOM, Prediction};
 use super::ringing::Filter;
 use crate::identify::filters::{gradient, local_maximum};
+use crate::identify::linear::Slope;
 use crate::identify::slow_noise::Errors;
 use crate::identify::spectrum::{SLOW_HZ, share_below};
 use crate::identify::variance_components::{self, Sample};
@@ -309,7 +310,7 @@ impl Noise {
     }
 
     /// The same of columns.
-    pub fn whitened_columns<'c>(&self, columns: &'c [Vec<f64>]) -> Cow<'c, [Vec<f64>]> {
+    pub fn whitened_columns<'c>(&self, columns: &'c [Slope]) -> Cow<'c, [Slope]> {
         if !self.whitening.is_coloured() {
             return Cow::Borrowed(columns);
         }

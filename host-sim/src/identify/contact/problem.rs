@@ -18,7 +18,7 @@ use super::observer::{Drive, Observed, SLIP_NOISES, observe};
 use super::struck_mode::innovations;
 use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE, covariance};
 use crate::identify::filters::{exponentials, rms};
-use crate::identify::linear::{self, normal_equations_of};
+use crate::identify::linear::{self, Slope, normal_equations_of};
 use crate::identify::term::{Column, Parameter, Starts};
 
 /// Degrees of freedom of Student's t: tails for what the noise model does not name.
@@ -46,6 +46,12 @@ const STATIC_WITHIN: f64 = 2.5;
 const STATIC_STEP: f64 = 0.02;
 /// Slopes are good enough where a step gains more than this share of what they promised.
 pub const KEPT_PROMISE: f64 = 0.5;
+/// The same of slopes that are mended by what the step showed: new ones cost as much as a dozen steps.
+pub const MENDED_PROMISE: f64 = 0.1;
+/// Steps, each shorter than the one before, that are tried along slopes that are mended, and along those taken where it stands.
+const SHORTER: [usize; 2] = [3, 6];
+/// So much of ln evidence changes no decision.
+pub const UNDECIDED: f64 = 0.5;
 
 /// Which number of the contact a baseline parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -222,13 +228,33 @@ pub struct Fit {
     pub r: Vec<f64>,
     /// −ln of likelihood times prior, but for constants.
     pub cost: f64,
+    /// Slopes of the residuals, a column for each value, where those that it ended with are good for this point.
+    pub slopes: Option<Vec<Slope>>,
 }
 
-/// Slopes of the residuals (negative) at some point.
+/// Slopes that change little while other parameters move: those of the baseline, and of ln friction as a whole.
 #[derive(Debug, Clone)]
 pub struct Slopes {
-    base: Vec<Vec<f64>>,
-    gain: Vec<f64>,
+    base: Vec<Slope>,
+    gain: Slope,
+}
+
+/// What is known of the slopes where a fit begins, taken near by.
+#[derive(Debug, Clone, Copy)]
+pub enum Near<'s> {
+    /// Nothing.
+    Nothing,
+    /// Those of the baseline.
+    Baseline(&'s Slopes),
+    /// All.
+    All(&'s [Slope]),
+}
+
+impl<'s> Near<'s> {
+    /// Those that a fit ended with, where it has them.
+    pub fn of(fit: &'s Fit) -> Self {
+        fit.slopes.as_deref().map_or(Self::Nothing, Self::All)
+    }
 }
 
 /// Logs, noise and baseline, ready for any hypothesis.
@@ -357,7 +383,7 @@ impl<'a> Problem<'a> {
                 ),
             };
             let mut observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
-            if let Some(ends) = &ends {
+            if let Some(ends) = ends.as_ref().filter(|ends| ends.iter().any(|end| *end != 0)) {
                 // The law's own force stands in for one that is beyond the end.
                 for ((end, force), by_law) in ends.iter().zip(&mut force_n).zip(&observed.force_n) {
                     match end {
@@ -438,12 +464,26 @@ impl<'a> Problem<'a> {
     }
 
     /// −∂r/∂p at a point, a column for each parameter.
-    pub fn jacobian(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Vec<f64>> {
+    pub fn jacobian(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Slope> {
         let slopes = self.slopes(terms, p, r);
         self.jacobian_with(&slopes, terms, p, r)
     }
 
-    /// Slopes that change little while other parameters move: those of the baseline, and of ln friction as a whole.
+    /// The same of a fit: those that it ended with, where they are good.
+    pub fn jacobian_of(&self, fit: &Fit) -> Vec<Slope> {
+        fit.slopes.clone().unwrap_or_else(|| self.jacobian(&fit.terms, &fit.p, &fit.r))
+    }
+
+    /// As [`Self::slopes`] of a fit, with those that it ended with, where they are good.
+    pub fn slopes_of(&self, fit: &Fit) -> Slopes {
+        let Some(known) = &fit.slopes else { return self.slopes(&fit.terms, &fit.p, &fit.r) };
+        Slopes {
+            base: known[..self.baseline.free.len()].to_vec(),
+            gain: self.gain_slope(self.change(&fit.terms, &fit.p), &fit.p, &fit.r),
+        }
+    }
+
+    /// Slopes at a point that change little while other parameters move.
     pub fn slopes(&self, terms: &[usize], p: &[f64], r: &[f64]) -> Slopes {
         let change = self.change(terms, p);
         let base = (0..self.baseline.free.len())
@@ -453,7 +493,12 @@ impl<'a> Problem<'a> {
                 self.difference(p, r, i, self.baseline.free[i].parameter.step, |_| Cow::Borrowed(&change))
             })
             .collect();
-        Slopes { base, gain: self.raised(change, p, r, |change| &mut change.log_factor) }
+        Slopes { base, gain: self.gain_slope(change, p, r) }
+    }
+
+    /// Slope along ln friction as a whole.
+    fn gain_slope(&self, change: Change, p: &[f64], r: &[f64]) -> Slope {
+        self.raised(change, p, r, |change| &mut change.log_factor)
     }
 
     /// Slope along what a column of a change is raised by everywhere.
@@ -463,7 +508,7 @@ impl<'a> Problem<'a> {
         p: &[f64],
         r: &[f64],
         column: impl Fn(&mut Change) -> &mut Option<Column>,
-    ) -> Vec<f64> {
+    ) -> Slope {
         const STEP: f64 = 0.01;
         let nothing = || self.logs.iter().map(|log| vec![0.0; log.len()]).collect();
         let raised = column(&mut change).get_or_insert_with(nothing);
@@ -479,20 +524,20 @@ impl<'a> Problem<'a> {
         i: usize,
         step: f64,
         change: impl Fn(&[f64]) -> Cow<'c, Change>,
-    ) -> Vec<f64> {
+    ) -> Slope {
         let mut q = p.to_vec();
         q[i] += step;
         self.slope_to(&change(&q), &q, r, step)
     }
 
     /// Slope from these residuals to those of a point that is a step away.
-    fn slope_to(&self, change: &Change, p: &[f64], r: &[f64], step: f64) -> Vec<f64> {
+    fn slope_to(&self, change: &Change, p: &[f64], r: &[f64], step: f64) -> Slope {
         let moved = self.scaled(&self.predict_changed(change, p));
         moved.iter().zip(r).map(|(a, b)| (b - a) / step).collect()
     }
 
     /// As [`Self::jacobian`], with slopes taken near by.
-    pub fn jacobian_with(&self, slopes: &Slopes, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Vec<f64>> {
+    pub fn jacobian_with(&self, slopes: &Slopes, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Slope> {
         let mut columns = slopes.base.clone();
         let mut at = columns.len();
         for count in 1..=terms.len() {
@@ -504,7 +549,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Columns of the last term alone.
-    pub fn term_columns(&self, slopes: &Slopes, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Vec<f64>> {
+    pub fn term_columns(&self, slopes: &Slopes, terms: &[usize], p: &[f64], r: &[f64]) -> Vec<Slope> {
         let Some(&last) = terms.last() else { return Vec::new() };
         self.columns_of(slopes, terms, p, r, last, p.len() - self.terms[last].parameters.len())
     }
@@ -518,9 +563,9 @@ impl<'a> Problem<'a> {
         r: &[f64],
         place: usize,
         at: usize,
-    ) -> Vec<Vec<f64>> {
+    ) -> Vec<Slope> {
         let term = &self.terms[place];
-        let through = |slope: &[f64], column: &Column| -> Vec<f64> {
+        let through = |slope: &[f64], column: &Column| -> Slope {
             column.iter().flatten().zip(slope).map(|(x, slope)| x * slope).collect()
         };
         let zero = self.baseline.free.iter().position(|base| base.role == Role::FrictionZero);
@@ -551,7 +596,7 @@ impl<'a> Problem<'a> {
     /// JᵀWJ, of these pairs of columns, and JᵀWr of iterated least squares on what is new in each sample; it counts as so much.
     fn normal(
         &self,
-        columns: &[Vec<f64>],
+        columns: &[Slope],
         r: &[f64],
         counts: impl Iterator<Item = f64>,
         wanted: impl Fn(usize, usize) -> bool + Sync,
@@ -563,38 +608,55 @@ impl<'a> Problem<'a> {
     }
 
     /// The same as a fit takes them: all samples count alike.
-    pub fn normal_equations(&self, columns: &[Vec<f64>], r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    pub fn normal_equations(&self, columns: &[Slope], r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
         self.normal_equations_of(columns, r, |_, _| true)
     }
 
     /// The same with the products of these pairs of columns alone, the later column first.
     pub fn normal_equations_of(
         &self,
-        columns: &[Vec<f64>],
+        columns: &[Slope],
         r: &[f64],
         wanted: impl Fn(usize, usize) -> bool + Sync,
     ) -> (DMatrix<f64>, DVector<f64>) {
         self.normal(columns, r, std::iter::repeat(1.0 / self.noise.temper), wanted)
     }
 
-    /// Gauss–Newton with damping from a start, at most so many iterations. The slopes of the baseline are those given, or
-    /// taken at the start; all slopes are kept as long as steps gain what they promise, where there are causes mended by what
-    /// each step showed: what is minimised is evaluated in each.
-    pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, slopes: Option<&Slopes>) -> Fit {
+    /// Gauss–Newton with damping from a start, at most so many iterations. The slopes are those given, or taken at the start; they
+    /// are kept as long as steps gain what they promise, where there are causes mended by what each step showed: what is
+    /// minimised is evaluated in each.
+    pub fn fit(&self, terms: &[usize], start: Vec<f64>, iterations: usize, near: Near<'_>) -> Fit {
+        let r = self.residuals(terms, &start);
+        let cost = self.cost(terms, &start, &r);
+        let at = Fit { terms: terms.to_vec(), p: start, r, cost, slopes: None };
+        self.descended(at, iterations, near)
+    }
+
+    /// Goes on from a fit to these logs and this noise, with the slopes that it ended with.
+    pub fn fitted_on(&self, mut fit: Fit, iterations: usize) -> Fit {
+        let slopes = fit.slopes.take();
+        self.descended(fit, iterations, slopes.as_deref().map_or(Near::Nothing, Near::All))
+    }
+
+    fn descended(&self, at: Fit, iterations: usize, near: Near<'_>) -> Fit {
+        let Fit { terms, mut p, mut r, mut cost, .. } = at;
+        let terms = terms.as_slice();
         let parameters: Vec<&Parameter> = self.parameters(terms).collect();
         let n = parameters.len();
-        let mut p = start;
-        let mut r = self.residuals(terms, &p);
-        let mut cost = self.cost(terms, &p, &r);
         let mut damping = 1e-3;
         let widths: Vec<f64> = parameters.iter().map(|q| q.width(TYPICAL_SCALE)).collect();
-        let mut near = slopes;
-        let mut kept: Option<Vec<Vec<f64>>> = None;
+        // The bias of `rig fit` is a small difference of fits of the baseline to noise of either sign: there slopes stay those of the
+        // point, and not of what one step made of its noise.
+        let mends = !terms.is_empty();
+        let kept_promise = if mends { MENDED_PROMISE } else { KEPT_PROMISE };
+        let mut near = near;
+        let mut kept: Option<Vec<Slope>> = None;
         for _ in 0..iterations {
-            let fresh = near.is_none() && kept.is_none();
-            let mut j = kept.take().unwrap_or_else(|| match near.take() {
-                Some(slopes) => self.jacobian_with(slopes, terms, &p, &r),
-                None => self.jacobian(terms, &p, &r),
+            let fresh = matches!(near, Near::Nothing) && kept.is_none();
+            let mut j = kept.take().unwrap_or_else(|| match std::mem::replace(&mut near, Near::Nothing) {
+                Near::All(slopes) => slopes.to_vec(),
+                Near::Baseline(slopes) => self.jacobian_with(slopes, terms, &p, &r),
+                Near::Nothing => self.jacobian(terms, &p, &r),
             });
             let (mut h, mut g) = self.normal_equations(&j, &r);
             for (i, (q, sd)) in parameters.iter().zip(&widths).enumerate() {
@@ -602,7 +664,7 @@ impl<'a> Problem<'a> {
                 g[i] -= (p[i] - q.mean) / (sd * sd);
             }
             let mut found = None;
-            for _ in 0..6 {
+            for _ in 0..if mends || fresh { SHORTER[usize::from(fresh)] } else { 1 } {
                 let mut damped = h.clone();
                 for i in 0..n {
                     damped[(i, i)] *= 1.0 + damping;
@@ -620,12 +682,10 @@ impl<'a> Problem<'a> {
                     break;
                 }
                 damping = (10.0 * damping).max(1e-2);
-                if !fresh {
-                    break;
-                }
             }
             let Some((next, next_r, next_cost)) = found else {
                 if fresh {
+                    kept = Some(j);
                     break;
                 }
                 continue;
@@ -633,22 +693,22 @@ impl<'a> Problem<'a> {
             let gained = cost - next_cost;
             let step = DVector::from_fn(n, |i, _| next[i] - p[i]);
             let promised = g.dot(&step) - 0.5 * step.dot(&(&h * &step));
-            if gained > KEPT_PROMISE * promised {
-                // The bias of `rig fit` is a small difference of fits of the baseline to noise of either sign: there slopes stay those
-                // of the point, and not of what one step made of its noise.
-                if !terms.is_empty() {
+            if gained > kept_promise * promised {
+                if mends {
                     linear::mend_slopes(&mut j, [&r, &next_r], step.as_slice(), &widths);
                 }
                 kept = Some(j);
             }
             (p, r, cost) = (next, next_r, next_cost);
             damping = (0.3 * damping).max(1e-6);
-            // Half a unit of log evidence changes no decision.
-            if gained < 0.5 && (fresh || kept.is_some()) {
+            // Causes are decided with the likelihood's share, but a step along slopes that are kept costs little; of a baseline
+            // alone values are stated.
+            let enough = if mends && fresh { UNDECIDED / CONTACT_SHARE } else { UNDECIDED };
+            if gained < enough && (fresh || kept.is_some()) {
                 break;
             }
         }
-        Fit { terms: terms.to_vec(), p, r, cost }
+        Fit { terms: terms.to_vec(), p, r, cost, slopes: kept }
     }
 
     /// Values of a fit with better static friction, looked for within its prior: breaking loose moves in time with it, from sample
@@ -669,7 +729,7 @@ impl<'a> Problem<'a> {
     /// A fit brought to its optimum: what is stated of it is less than what decides.
     pub fn settled(&self, mut fit: Fit) -> Fit {
         for _ in 0..MOST_SETTLING {
-            let next = self.fit(&fit.terms, fit.p.clone(), 1, None);
+            let next = self.fit(&fit.terms, fit.p.clone(), 1, Near::Nothing);
             let gained = fit.cost - next.cost;
             fit = next;
             if gained < SETTLED {
@@ -724,7 +784,7 @@ impl<'a> Problem<'a> {
 
     /// Curvature of −ln likelihood at a fit, and the slope of ln likelihood.
     fn curvature(&self, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
-        self.normal(&self.jacobian(&fit.terms, &fit.p, &fit.r), &fit.r, self.noise.counts(), |_, _| true)
+        self.normal(&self.jacobian_of(fit), &fit.r, self.noise.counts(), |_, _| true)
     }
 
     /// Takes the noise from what a fit leaves.

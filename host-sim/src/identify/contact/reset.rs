@@ -48,7 +48,7 @@ impl Loose {
 mod tests {
     use super::super::baseline::{KNOWN_WITHIN, baseline};
     use super::super::log::ContactLog;
-    use super::super::problem::{Baseline, Problem, Role};
+    use super::super::problem::{Baseline, Near, Problem, Role};
     use crate::files::log::Log;
     use crate::files::model_file::{ModelFile, ModelKind};
     use crate::files::rig_file::{Mode, RigFile};
@@ -178,7 +178,7 @@ mod tests {
             let numbers = baseline.numbers(p);
             ((numbers.a0 + numbers.a1) / STATIC - 1.0).abs()
         };
-        let fit = problem.fit(&[], means(&baseline), 12, None);
+        let fit = problem.fit(&[], means(&baseline), 12, Near::Nothing);
         assert!(off(&fit.p) > 0.1, "{}", off(&fit.p));
         let better = problem.better_static(&fit).unwrap();
         assert!(off(&better) < 0.03, "{}", off(&better));

@@ -6,15 +6,17 @@
 //! 3. the noise's sources and the effective sample size are fitted to the residuals of the best set, and the best sets
 //!    are fitted again with them.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::log::ContactLog;
 use super::noise::MODEL_FORM;
-use super::problem::{Fit, Problem, Slopes};
+use super::problem::{Fit, Near, Problem, Slopes};
 use crate::identify::evidence::{SCALES, log_mean_exp};
 use crate::identify::fit_interval;
-use crate::identify::linear;
+use crate::identify::linear::{self, Slope};
 
 /// A hypothesis with its ln evidence.
 #[derive(Debug, Clone)]
@@ -40,8 +42,8 @@ const FINALISTS: usize = 8;
 pub const WORTH: f64 = 0.5 * MODEL_FORM;
 /// −ln posterior by which a point has to be better than a known optimum to be another valley's: what a fit leaves undone.
 const NO_WORSE: f64 = 0.5;
-/// Iterations of a set that is fitted from where it stood with one cause more.
-const SUBSET_ITERATIONS: usize = 8;
+/// Iterations of the baseline, and of a set that is fitted from where it stood with one cause more or with another noise.
+const ITERATIONS: usize = 6;
 /// Iterations of a larger set from where its parent stood, with its parent's slopes.
 const FIRST_STEPS: usize = 5;
 /// Iterations of a law that takes its columns' place.
@@ -55,7 +57,7 @@ pub fn without_each(problem: &Problem<'_>, fit: &Fit, fitted: &[&Fit]) -> Vec<Fi
         let left = without(problem, fit, out);
         match fitted.iter().find(|known| same_set(&known.terms, &left.terms)) {
             Some(known) => (*known).clone(),
-            None => problem.fit(&left.terms, left.p, SUBSET_ITERATIONS, None),
+            None => problem.fit(&left.terms, left.p.clone(), ITERATIONS, Near::of(&left)),
         }
     };
     (0..fit.terms.len()).into_par_iter().map(left).collect()
@@ -92,7 +94,7 @@ fn missing<'f>(
             }
         }
     }
-    let fit = |left: Fit| problem.fit(&left.terms, left.p, SUBSET_ITERATIONS, None);
+    let fit = |left: Fit| problem.fit(&left.terms, left.p.clone(), ITERATIONS, Near::of(&left));
     missing.into_par_iter().map(fit).collect()
 }
 
@@ -124,7 +126,7 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
     // what it does not explain in its slopes, and would have it in the noise too.
     let found = problem.noise_at(&[], &as_in_file.p);
     problem.noise.leave_out(&found);
-    let base = problem.fit(&[], as_in_file.p, SUBSET_ITERATIONS, None);
+    let base = problem.fit(&[], as_in_file.p, ITERATIONS, Near::Nothing);
     progress("single causes");
     let (singles, known) = singles(problem, denied, &base);
     let mut all: Vec<Fit> = singles.iter().take(FINALISTS).cloned().collect();
@@ -148,6 +150,7 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
     let mut ranked = rank(problem, Vec::new(), all);
     for _ in 0..2 {
         let refitted_to = ranked[0].fit.terms.clone();
+        let before = problem.noise.deviation.clone();
         problem.refit_noise(&ranked[0].fit);
         // What repeats itself is told from what no cause explains by the set that explains most.
         if let Some(fullest) = ranked.iter().map(|r| &r.fit).min_by(|a, b| a.cost.total_cmp(&b.cost)) {
@@ -161,8 +164,11 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
                 kept.extend(ranked.iter().find(|r| r.fit.terms.len() == size).map(|r| r.fit.clone()));
             }
         }
-        let again: Vec<Fit> =
-            kept.into_par_iter().map(|fit| problem.fit(&fit.terms, fit.p, 6, None)).collect();
+        let again = |fit: Fit| {
+            let fit = rescaled(problem, fit, &before);
+            problem.fit(&fit.terms, fit.p.clone(), ITERATIONS, Near::of(&fit))
+        };
+        let again = kept.into_par_iter().map(again).collect();
         ranked = rank(problem, Vec::new(), again);
         ranked = closed(problem, ranked);
         // The noise is that of the answer.
@@ -178,8 +184,17 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
 
 /// Sets that were found with another noise model beside those of this one.
 pub fn beside(problem: &Problem<'_>, ranked: Vec<Ranked>, found: Vec<Fit>) -> Vec<Ranked> {
-    let again = |fit: Fit| problem.fit(&fit.terms, fit.p, SUBSET_ITERATIONS, None);
+    let again = |fit: Fit| problem.fit(&fit.terms, fit.p, ITERATIONS, Near::Nothing);
     rank(problem, ranked, found.into_par_iter().map(again).collect())
+}
+
+/// A fit whose slopes are of residuals over these deviations, in those of the noise as it is.
+fn rescaled(problem: &Problem<'_>, mut fit: Fit, before: &[f64]) -> Fit {
+    for slope in fit.slopes.iter_mut().flatten() {
+        let each = Arc::make_mut(slope).iter_mut().zip(before).zip(&problem.noise.deviation);
+        each.for_each(|((slope, before), after)| *slope *= before / after);
+    }
+    fit
 }
 
 /// How many of the samples that swing count as one to what is fitted.
@@ -214,12 +229,14 @@ fn same_set(a: &[usize], b: &[usize]) -> bool {
     a.len() == b.len() && a.iter().all(|term| b.contains(term))
 }
 
-/// A fit with one of its terms taken out, not fitted again.
+/// A fit with one of its terms taken out, values and slopes of the others as they were.
 fn without(problem: &Problem<'_>, fit: &Fit, out: usize) -> Fit {
     let count = |term: &usize| problem.terms[*term].parameters.len();
     let from = problem.baseline.free.len() + fit.terms[..out].iter().map(count).sum::<usize>();
+    let own = from..from + count(&fit.terms[out]);
     let mut left = fit.clone();
-    left.p.drain(from..from + count(&fit.terms[out]));
+    left.p.drain(own.clone());
+    left.slopes.iter_mut().for_each(|slopes| drop(slopes.drain(own.clone())));
     left.terms.remove(out);
     left
 }
@@ -227,8 +244,8 @@ fn without(problem: &Problem<'_>, fit: &Fit, out: usize) -> Fit {
 /// The baseline fitted without any cause.
 pub fn baseline(problem: &Problem<'_>) -> Fit {
     let start: Vec<f64> = problem.baseline.free.iter().map(|b| b.parameter.mean).collect();
-    let near = problem.fit(&[], start, 6, None);
-    problem.fit(&[], problem.better_static(&near).unwrap_or(near.p), 6, None)
+    let near = problem.fit(&[], start, ITERATIONS, Near::Nothing);
+    problem.fit(&[], problem.better_static(&near).unwrap_or(near.p), ITERATIONS, Near::Nothing)
 }
 
 /// Of each set the fit that costs least, the least first.
@@ -243,16 +260,11 @@ fn unique(mut fits: Vec<Fit>) -> Vec<Fit> {
     kept
 }
 
-/// The best ones fitted on, from slopes that are near.
-fn improved(
-    problem: &Problem<'_>,
-    mut fits: Vec<Fit>,
-    (keep, iterations): (usize, usize),
-    slopes: Option<&Slopes>,
-) -> Vec<Fit> {
+/// The best ones fitted on.
+fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, (keep, iterations): (usize, usize)) -> Vec<Fit> {
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     fits.truncate(keep);
-    let again = |fit: Fit| problem.fit(&fit.terms, fit.p, iterations, slopes);
+    let again = |fit: Fit| problem.fitted_on(fit, iterations);
     unique(fits.into_par_iter().map(again).collect())
 }
 
@@ -266,7 +278,9 @@ fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Ve
             .collect();
         starts
             .into_par_iter()
-            .map(|(term, start)| problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Some(&slopes)))
+            .map(|(term, start)| {
+                problem.fit(&[term], [base.p.as_slice(), &start].concat(), 2, Near::Baseline(&slopes))
+            })
             .collect()
     };
     let wanted = |term: &usize| !problem.terms[*term].law && !denied.contains(term);
@@ -279,13 +293,13 @@ fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Ve
             known[fit.terms[0]].get_or_insert_with(Vec::new).push(fit.p[base.p.len()..].to_vec());
         }
     }
-    let mut fits = improved(problem, tried, (16, 3), Some(&slopes));
+    let mut fits = improved(problem, tried, (16, 3));
     // The laws of the effects that lead: a law bends as its columns cannot.
     let leading: Vec<&str> =
         fits.iter().take(PARENTS).map(|fit| problem.terms[fit.terms[0]].effect).collect();
     let laws = |term: &usize| problem.terms[*term].law && leading.contains(&problem.terms[*term].effect);
     fits.extend(first((0..problem.terms.len()).filter(laws).collect()));
-    (improved(problem, fits, (10, 5), None), known)
+    (improved(problem, fits, (10, 5)), known)
 }
 
 /// The set with each of its terms in the form that can be exported.
@@ -296,7 +310,7 @@ pub fn as_laws(problem: &Problem<'_>, fit: &Fit) -> Fit {
         if term.export.is_some() && (term.law || term.columns.is_none()) {
             continue;
         }
-        if let Some(best) = with_law(problem, &current, place, SUBSET_ITERATIONS) {
+        if let Some(best) = with_law(problem, &current, place, ITERATIONS) {
             // The places of the others have moved by one: the law stands last.
             current = problem.settled(best);
             return as_laws(problem, &current);
@@ -314,9 +328,10 @@ fn with_law(problem: &Problem<'_>, fit: &Fit, place: usize, iterations: usize) -
         .filter(law)
         .flat_map(|law| problem.starts(&others, law).into_iter().map(move |start| (law, start)))
         .collect();
+    let slopes = problem.slopes_of(fit);
     let fits = starts.into_par_iter().map(|(law, start)| {
         let terms: Vec<usize> = others.terms.iter().copied().chain([law]).collect();
-        problem.fit(&terms, [others.p.as_slice(), &start].concat(), iterations, None)
+        problem.fit(&terms, [others.p.as_slice(), &start].concat(), iterations, Near::Baseline(&slopes))
     });
     fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
@@ -342,13 +357,14 @@ fn table(
     known: &[Option<Points>],
     afresh: bool,
 ) -> Vec<(f64, usize, Vec<Vec<f64>>)> {
-    let j0 = problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r);
+    let j0 = parent.slopes.clone();
+    let j0 = j0.unwrap_or_else(|| problem.jacobian_with(slopes, &parent.terms, &parent.p, &parent.r));
     let has = |effect: &str| parent.terms.iter().any(|t| problem.terms[*t].effect == effect);
     let others: Vec<usize> = (0..problem.terms.len())
         .filter(|t| !problem.terms[*t].law && !denied.contains(t) && !has(problem.terms[*t].effect))
         .collect();
     // Columns of each other term, and the points that they stand for where it is not linear.
-    let blocks: Vec<(Vec<Vec<f64>>, Points)> = others
+    let blocks: Vec<(Vec<Slope>, Points)> = others
         .par_iter()
         .map(|&term| {
             let terms: Vec<usize> = parent.terms.iter().copied().chain([term]).collect();
@@ -437,8 +453,7 @@ fn table(
 }
 
 fn children(problem: &Problem<'_>, denied: &[usize], parents: &[Fit], known: &[Option<Points>]) -> Vec<Fit> {
-    let slopes: Vec<Slopes> =
-        parents.iter().map(|parent| problem.slopes(&parent.terms, &parent.p, &parent.r)).collect();
+    let slopes: Vec<Slopes> = parents.iter().map(|parent| problem.slopes_of(parent)).collect();
     let mut candidates: Vec<(f64, Vec<usize>, (&Slopes, Points))> = Vec::new();
     for (place, (parent, slopes)) in parents.iter().zip(&slopes).enumerate() {
         let [level, _] = problem.log_evidence(parent);
@@ -466,9 +481,9 @@ fn children(problem: &Problem<'_>, denied: &[usize], parents: &[Fit], known: &[O
         .collect();
     let first: Vec<Fit> = starts
         .into_par_iter()
-        .map(|(terms, slopes, start)| problem.fit(&terms, start, FIRST_STEPS, Some(slopes)))
+        .map(|(terms, slopes, start)| problem.fit(&terms, start, FIRST_STEPS, Near::Baseline(slopes)))
         .collect();
-    bent(problem, improved(problem, first, (6, 5), None))
+    bent(problem, improved(problem, first, (6, 5)))
 }
 
 /// All of these sets with their evidence, best first; of those that were ranked under the same noise it is known.
@@ -482,4 +497,116 @@ fn rank(problem: &Problem<'_>, mut ranked: Vec<Ranked>, fits: Vec<Fit>) -> Vec<R
     );
     ranked.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     ranked
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::baseline::{KNOWN_WITHIN, baseline};
+    use super::super::change::ContactTerm;
+    use super::super::problem::{Baseline, UNDECIDED};
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::model_file::ModelFile;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+    use crate::identify::contact_part::contact_terms;
+    use crate::identify::effects::coordinates::Scales;
+    use crate::identify::evidence::CONTACT_SHARE;
+    use crate::identify::linear::dot;
+    use crate::identify::noise::White;
+
+    const COUNT: usize = 4000;
+
+    /// A log under loads that change, baseline and terms; the torque is the model's own with noise.
+    fn logged() -> (Vec<ContactLog>, Baseline, Vec<ContactTerm>) {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let baseline = baseline(&ModelFile::assumed(&[]).unwrap(), KNOWN_WITHIN).with_bridge_zeros(&rig);
+        let series = |of: &dyn Fn(f64) -> f64| (0..COUNT).map(|i| of(1e-3 * i as f64)).collect::<Vec<f64>>();
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, series(&|t| t));
+        log.set_signal(Signal::M2Speed, series(&|t| 4.0 * (2.0 * t).sin()));
+        log.set_signal(Signal::NormalForce, series(&|t| 60.0 + 20.0 * (3.0 * t).cos()));
+        log.set_signal(Signal::FrictionTorque, series(&|t| 2.5 * (30.0 * (2.0 * t).sin()).tanh()));
+        let p: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
+        // The slip is observed from the torque: a few rounds make the two agree.
+        for round in 0..4 {
+            let logs = [ContactLog::new(&log, &rig).unwrap()];
+            let mut torque = Problem::new(&logs, &baseline, &[]).predict(&[], &p).shown_nm;
+            let mut white = White::new(3);
+            if round == 3 {
+                torque.iter_mut().for_each(|torque| *torque += 0.01 * white.next());
+            }
+            log.set_signal(Signal::FrictionTorque, torque);
+        }
+        let logs = vec![ContactLog::new(&log, &rig).unwrap()];
+        let terms = contact_terms(&logs, &Scales::new(&logs), true, 1, true);
+        (logs, baseline, terms)
+    }
+
+    /// Two terms of columns, of different effects.
+    fn two(terms: &[ContactTerm]) -> Vec<usize> {
+        let first = terms.iter().position(|term| term.columns.is_some()).unwrap();
+        let other = |term: &ContactTerm| term.columns.is_some() && term.effect != terms[first].effect;
+        vec![first, terms.iter().position(other).unwrap()]
+    }
+
+    fn fitted(problem: &Problem<'_>, terms: &[usize], iterations: usize) -> Fit {
+        let start = problem.parameters(terms).map(|q| q.mean).collect();
+        problem.fit(terms, start, iterations, Near::Nothing)
+    }
+
+    /// Cosine of the angle between two columns.
+    fn alike(a: &[f64], b: &[f64]) -> f64 {
+        dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
+    }
+
+    #[test]
+    fn what_is_left_of_a_set_keeps_values_and_slopes_of_the_others() {
+        let (logs, baseline, terms) = logged();
+        let problem = Problem::new(&logs, &baseline, &terms);
+        let set = two(&terms);
+        let mut fit = fitted(&problem, &set, 1);
+        fit.slopes = Some(problem.jacobian(&fit.terms, &fit.p, &fit.r));
+        for out in 0..2 {
+            let left = without(&problem, &fit, out);
+            let fresh = problem.jacobian(&left.terms, &left.p, &problem.residuals(&left.terms, &left.p));
+            let slopes = left.slopes.unwrap();
+            assert_eq!((slopes.len(), fresh.len()), (left.p.len(), left.p.len()));
+            for (at, (kept, fresh)) in slopes.iter().zip(&fresh).enumerate() {
+                assert!(
+                    dot(fresh, fresh) == 0.0 || alike(kept, fresh) > 0.9,
+                    "{out} {at} {}",
+                    alike(kept, fresh)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_under_one_noise_are_those_under_another_in_its_deviations() {
+        let (logs, baseline, terms) = logged();
+        let mut problem = Problem::new(&logs, &baseline, &terms);
+        let set = two(&terms);
+        let mut fit = fitted(&problem, &set, 1);
+        fit.slopes = Some(problem.jacobian(&fit.terms, &fit.p, &fit.r));
+        let before = problem.noise.deviation.clone();
+        problem.noise.deviation.iter_mut().enumerate().for_each(|(i, s)| *s *= 1.0 + (i % 7) as f64);
+        let fresh = problem.jacobian(&fit.terms, &fit.p, &problem.residuals(&fit.terms, &fit.p));
+        let slopes = rescaled(&problem, fit, &before).slopes.unwrap();
+        for (at, (kept, fresh)) in slopes.iter().zip(&fresh).enumerate() {
+            assert!(dot(fresh, fresh) == 0.0 || alike(kept, fresh) > 0.9999, "{at}: {}", alike(kept, fresh));
+        }
+    }
+
+    #[test]
+    fn a_fit_that_goes_on_with_its_slopes_comes_as_far_as_one_that_takes_new_ones() {
+        let (logs, baseline, terms) = logged();
+        let problem = Problem::new(&logs, &baseline, &terms);
+        let set = two(&terms);
+        let start = fitted(&problem, &set, 1);
+        assert!(start.slopes.is_some());
+        let on = problem.fitted_on(start.clone(), 6);
+        let anew = problem.fit(&start.terms, start.p.clone(), 6, Near::Nothing);
+        assert!(on.cost < anew.cost + UNDECIDED / CONTACT_SHARE, "{} {} {}", start.cost, on.cost, anew.cost);
+    }
 }
