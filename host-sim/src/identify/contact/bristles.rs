@@ -12,8 +12,8 @@ use wide::f64x4;
 use super::law::Contact;
 use super::observer::{Drive, Observed, SLIP_NOISES, least_load_n};
 
-/// Over so many of the bristles' own ways nothing is left of where they were, e⁻³⁷ < 2⁻⁵³.
-const FORGOTTEN: f64 = 37.0;
+/// Over so many of the bristles' own ways nothing is left of where they were, nor of a bend over so many of its widths: e⁻³⁷ < 2⁻⁵³.
+pub(super) const FORGOTTEN: f64 = 37.0;
 /// Points of Gauss and Hermite over the noise of the way: deviations from the mean, and weights; the fourth is none.
 const OFF: [f64; 4] = [0.0, 1.732_050_807_568_877_2, -1.732_050_807_568_877_2, 0.0];
 const WEIGHTS: [f64; 4] = [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0, 0.0];

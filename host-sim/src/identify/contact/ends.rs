@@ -6,11 +6,10 @@
 use model_core::extension::adc_saturation::AdcSaturation;
 use wide::f64x4;
 
+use super::bristles::FORGOTTEN;
+
 /// The smallest slope of the channel that is worth a way back.
 const LEAST_SLOPE: f64 = 0.2;
-
-/// So many knees from an end nothing is bent: e^−37 is less than a last digit.
-const STRAIGHT: f64 = 37.0;
 
 /// Changes each of these values.
 fn in_lanes(values: &mut [f64], of: impl Fn(f64x4) -> f64x4) {
@@ -60,7 +59,7 @@ impl Ends {
         }
         let knee = f64x4::splat(self.knee);
         let beyond = |excess: f64x4| {
-            let small = (-(excess / knee).abs()).max(f64x4::splat(-STRAIGHT)).exp();
+            let small = (-(excess / knee).abs()).max(f64x4::splat(-FORGOTTEN)).exp();
             excess.max(f64x4::ZERO) + knee * (small + f64x4::ONE).ln()
         };
         let [low, high] = [self.low, self.high].map(f64x4::splat);
@@ -84,7 +83,7 @@ impl Ends {
         }
         let knee = f64x4::splat(self.knee);
         let held_back = |inside: f64x4| {
-            let small = (-inside / knee).max(f64x4::splat(-STRAIGHT)).exp();
+            let small = (-inside / knee).max(f64x4::splat(-FORGOTTEN)).exp();
             -knee * (f64x4::ONE - small).ln()
         };
         let [low, high] = [self.low, self.high].map(f64x4::splat);
@@ -129,6 +128,7 @@ mod tests {
             let mut shown = values.clone();
             ends.show(&mut shown);
             for (shown, acts) in shown.iter().zip(&values) {
+                // The lanes' logarithm has ln 2 to 5e-14, and there are some of it.
                 assert!((shown - ends.shown(*acts)).abs() < 1e-12, "{acts}: {shown}");
             }
         }

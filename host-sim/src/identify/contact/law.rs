@@ -23,9 +23,13 @@ pub struct Curve {
     slopes: Vec<f64>,
 }
 
+/// Slip speed at which a cell begins, m/s.
+fn edge(cell: u64) -> f64 {
+    f64::from_bits((FIRST_CELL + cell) << REST_BITS)
+}
+
 /// Slip speeds of the table's entries, m/s.
 pub fn speeds() -> impl Iterator<Item = f64> {
-    let edge = |cell: u64| f64::from_bits((FIRST_CELL + cell) << REST_BITS);
     std::iter::once(0.0).chain((0..ENTRIES as u64 - 1).map(edge))
 }
 
@@ -36,7 +40,6 @@ impl Curve {
     }
 
     fn of(values: Vec<f64>) -> Self {
-        let edge = |cell: u64| f64::from_bits((FIRST_CELL + cell) << REST_BITS);
         let rises = values[1..].windows(2).map(|g| g[1] - g[0]);
         let slopes = rises.zip(0..).map(|(rise, cell)| rise / (edge(cell + 1) - edge(cell))).collect();
         Self { values, slopes }
@@ -71,13 +74,12 @@ impl Curve {
     #[inline]
     pub fn at_with_derivative(&self, slip_m_s: f64) -> (f64, f64) {
         let bits = slip_m_s.max(SLOWEST_M_S).to_bits() >> REST_BITS;
-        let cell = (bits - FIRST_CELL) as usize;
-        let Some(&derivative) = self.slopes.get(cell) else { return (self.at_speed(), 0.0) };
+        let cell = bits - FIRST_CELL;
+        let Some(&derivative) = self.slopes.get(cell as usize) else { return (self.at_speed(), 0.0) };
         if slip_m_s <= SLOWEST_M_S {
             return (self.at(slip_m_s), derivative);
         }
-        let edge = f64::from_bits(bits << REST_BITS);
-        (self.values[cell + 1] + derivative * (slip_m_s - edge), derivative)
+        (self.values[cell as usize + 1] + derivative * (slip_m_s - edge(cell)), derivative)
     }
 
     /// |g′(w)|, 1/(m/s).

@@ -48,8 +48,6 @@ const STATIC_STEP: f64 = 0.02;
 pub const KEPT_PROMISE: f64 = 0.5;
 /// The same of slopes that are mended by what the step showed: new ones cost as much as a dozen steps.
 pub const MENDED_PROMISE: f64 = 0.1;
-/// Steps, each shorter than the one before, that are tried along slopes that are mended, and along those taken where it stands.
-const SHORTER: [usize; 2] = [3, 6];
 /// So much of ln evidence changes no decision.
 pub const UNDECIDED: f64 = 0.5;
 
@@ -240,20 +238,20 @@ pub struct Slopes {
 }
 
 /// What is known of the slopes where a fit begins, taken near by.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum Near<'s> {
     /// Nothing.
     Nothing,
     /// Those of the baseline.
     Baseline(&'s Slopes),
     /// All.
-    All(&'s [Slope]),
+    All(Vec<Slope>),
 }
 
-impl<'s> Near<'s> {
+impl From<Option<Vec<Slope>>> for Near<'_> {
     /// Those that a fit ended with, where it has them.
-    pub fn of(fit: &'s Fit) -> Self {
-        fit.slopes.as_deref().map_or(Self::Nothing, Self::All)
+    fn from(slopes: Option<Vec<Slope>>) -> Self {
+        slopes.map_or(Self::Nothing, Self::All)
     }
 }
 
@@ -632,13 +630,18 @@ impl<'a> Problem<'a> {
         self.descended(at, iterations, near)
     }
 
-    /// Goes on from a fit to these logs and this noise, with the slopes that it ended with.
-    pub fn fitted_on(&self, mut fit: Fit, iterations: usize) -> Fit {
-        let slopes = fit.slopes.take();
-        self.descended(fit, iterations, slopes.as_deref().map_or(Near::Nothing, Near::All))
+    /// Begins where a fit to something else stood, with the slopes that it ended with.
+    pub fn refitted(&self, fit: Fit, iterations: usize) -> Fit {
+        self.fit(&fit.terms, fit.p, iterations, fit.slopes.into())
     }
 
-    fn descended(&self, at: Fit, iterations: usize, near: Near<'_>) -> Fit {
+    /// Goes on from a fit to these logs and this noise, with the slopes that it ended with.
+    pub fn fitted_on(&self, mut fit: Fit, iterations: usize) -> Fit {
+        let near = fit.slopes.take().into();
+        self.descended(fit, iterations, near)
+    }
+
+    fn descended(&self, at: Fit, iterations: usize, mut near: Near<'_>) -> Fit {
         let Fit { terms, mut p, mut r, mut cost, .. } = at;
         let terms = terms.as_slice();
         let parameters: Vec<&Parameter> = self.parameters(terms).collect();
@@ -649,12 +652,11 @@ impl<'a> Problem<'a> {
         // point, and not of what one step made of its noise.
         let mends = !terms.is_empty();
         let kept_promise = if mends { MENDED_PROMISE } else { KEPT_PROMISE };
-        let mut near = near;
         let mut kept: Option<Vec<Slope>> = None;
         for _ in 0..iterations {
             let fresh = matches!(near, Near::Nothing) && kept.is_none();
             let mut j = kept.take().unwrap_or_else(|| match std::mem::replace(&mut near, Near::Nothing) {
-                Near::All(slopes) => slopes.to_vec(),
+                Near::All(slopes) => slopes,
                 Near::Baseline(slopes) => self.jacobian_with(slopes, terms, &p, &r),
                 Near::Nothing => self.jacobian(terms, &p, &r),
             });
@@ -664,7 +666,15 @@ impl<'a> Problem<'a> {
                 g[i] -= (p[i] - q.mean) / (sd * sd);
             }
             let mut found = None;
-            for _ in 0..if mends || fresh { SHORTER[usize::from(fresh)] } else { 1 } {
+            // Each step is shorter than the one before; it costs little beside new slopes.
+            let tried = if fresh {
+                6
+            } else if mends {
+                3
+            } else {
+                1
+            };
+            for _ in 0..tried {
                 let mut damped = h.clone();
                 for i in 0..n {
                     damped[(i, i)] *= 1.0 + damping;

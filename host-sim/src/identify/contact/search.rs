@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::log::ContactLog;
 use super::noise::MODEL_FORM;
-use super::problem::{Fit, Near, Problem, Slopes};
+use super::problem::{Fit, Near, Problem, Slopes, UNDECIDED};
 use crate::identify::evidence::{SCALES, log_mean_exp};
 use crate::identify::fit_interval;
 use crate::identify::linear::{self, Slope};
@@ -40,8 +40,6 @@ const FINALISTS: usize = 8;
 /// A larger set is looked for where each part of the smaller one changes the prediction by this share of the signal: half
 /// of what the model's form is known to.
 pub const WORTH: f64 = 0.5 * MODEL_FORM;
-/// −ln posterior by which a point has to be better than a known optimum to be another valley's: what a fit leaves undone.
-const NO_WORSE: f64 = 0.5;
 /// Iterations of the baseline, and of a set that is fitted from where it stood with one cause more or with another noise.
 const ITERATIONS: usize = 6;
 /// Iterations of a larger set from where its parent stood, with its parent's slopes.
@@ -57,7 +55,7 @@ pub fn without_each(problem: &Problem<'_>, fit: &Fit, fitted: &[&Fit]) -> Vec<Fi
         let left = without(problem, fit, out);
         match fitted.iter().find(|known| same_set(&known.terms, &left.terms)) {
             Some(known) => (*known).clone(),
-            None => problem.fit(&left.terms, left.p.clone(), ITERATIONS, Near::of(&left)),
+            None => problem.refitted(left, ITERATIONS),
         }
     };
     (0..fit.terms.len()).into_par_iter().map(left).collect()
@@ -94,8 +92,7 @@ fn missing<'f>(
             }
         }
     }
-    let fit = |left: Fit| problem.fit(&left.terms, left.p.clone(), ITERATIONS, Near::of(&left));
-    missing.into_par_iter().map(fit).collect()
+    missing.into_par_iter().map(|left| problem.refitted(left, ITERATIONS)).collect()
 }
 
 /// RMS of the difference of two predictions over that of the signal, where the channel is well known.
@@ -164,10 +161,7 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
                 kept.extend(ranked.iter().find(|r| r.fit.terms.len() == size).map(|r| r.fit.clone()));
             }
         }
-        let again = |fit: Fit| {
-            let fit = rescaled(problem, fit, &before);
-            problem.fit(&fit.terms, fit.p.clone(), ITERATIONS, Near::of(&fit))
-        };
+        let again = |fit: Fit| problem.refitted(rescaled(problem, fit, &before), ITERATIONS);
         let again = kept.into_par_iter().map(again).collect();
         ranked = rank(problem, Vec::new(), again);
         ranked = closed(problem, ranked);
@@ -213,7 +207,7 @@ fn repeated(problem: &Problem<'_>, fit: &Fit) -> f64 {
 /// With the subsets of the best sets that are missing or stand in a side valley, each fitted from where its set stood.
 fn closed(problem: &Problem<'_>, mut ranked: Vec<Ranked>) -> Vec<Ranked> {
     // Fitted, and not as well as the larger set's own point without the cause: it stood in a side valley.
-    let good = |fit: &Fit, left: &Fit| fit.cost < problem.cost_at(&left.terms, &left.p) + NO_WORSE;
+    let good = |fit: &Fit, left: &Fit| fit.cost < problem.cost_at(&left.terms, &left.p) + UNDECIDED;
     for _ in 0..2 {
         let known: Vec<&Fit> = ranked.iter().map(|r| &r.fit).collect();
         let fits = missing(problem, known.iter().copied().take(CLOSED), &known, &good);
@@ -503,7 +497,7 @@ fn rank(problem: &Problem<'_>, mut ranked: Vec<Ranked>, fits: Vec<Fit>) -> Vec<R
 mod tests {
     use super::super::baseline::{KNOWN_WITHIN, baseline};
     use super::super::change::ContactTerm;
-    use super::super::problem::{Baseline, UNDECIDED};
+    use super::super::problem::Baseline;
     use super::*;
     use crate::files::log::Log;
     use crate::files::model_file::ModelFile;
