@@ -12,7 +12,7 @@ use super::filters::{
     self, WIDEST_MEAN, adaptively_smoothed, gaussian, largest_change, local_maximum, rms, steps, white_share,
 };
 use super::grid::Grid;
-use super::noise;
+use super::noise::{self, White};
 use super::term::Parameter;
 use crate::files::log::{Log, LogKind, unwrapped};
 use crate::input_error::InputError;
@@ -84,6 +84,8 @@ pub struct DriveLog {
     pub acceleration: Vec<f64>,
     /// Effort and acceleration as quick as blows of a coupling are.
     pub quick: [Vec<f64>; 2],
+    /// Width of the filter of those, samples.
+    pub quick_width: f64,
     /// Width of the filter, samples.
     pub width: f64,
     /// White noise of the inertial torque behind the filter.
@@ -161,8 +163,7 @@ impl DriveLog {
             inertia * angle_noise * curvature_passed(*width, contact) / (dt * dt) < QUICK_NOISE * rms(&effort)
         };
         let quick_width = QUICK.into_iter().find(small).unwrap_or(width).min(width);
-        let quick_acceleration = gaussian(&position, quick_width, 2).iter().map(|d| d / (dt * dt)).collect();
-        let quick = [gaussian(&effort, quick_width, 0), quick_acceleration];
+        let quick = quick(&effort, &position, quick_width, dt);
         let speed: Vec<f64> = gaussian(&position, width, 1).iter().map(|d| d / dt).collect();
         let (inertial_noise, inertial_swing) = if inertia.is_finite() {
             let white = of_angle(noise::difference_deviation(&position), white_curvature(width));
@@ -187,6 +188,7 @@ impl DriveLog {
             speed,
             acceleration,
             quick,
+            quick_width,
             width,
             inertial_noise,
             inertial_swing,
@@ -200,6 +202,20 @@ impl DriveLog {
         let ringing =
             self.friction.as_ref().map(|friction| shown.iter().zip(friction).map(|(a, b)| a - b).collect());
         Self { ringing, ..self }
+    }
+
+    /// The same with as much noise of each sensor again as there is in it.
+    #[must_use]
+    pub fn noisier(&self, white: &mut White) -> Self {
+        let contact = self.friction.is_some();
+        let add = |values: &[f64], deviation: f64, white: &mut White| -> Vec<f64> {
+            values.iter().map(|x| x + deviation * white.next()).collect()
+        };
+        let effort = add(&self.effort, deviation_of(contact, &self.effort), white);
+        let position = add(&self.position, noise::difference_deviation(&self.position), white);
+        let friction = self.friction.as_ref().map(|f| add(f, noise::bridge_deviation(f), white));
+        let quick = quick(&effort, &position, self.quick_width, self.grid.step_s);
+        Self { effort, position, friction, quick, ..self.clone() }
     }
 
     /// Points of the grid.
@@ -216,6 +232,12 @@ impl DriveLog {
     pub fn filtered(&self, values: &[f64]) -> Vec<f64> {
         gaussian(values, self.width, 0)
     }
+}
+
+/// Effort and acceleration behind a filter of this width.
+fn quick(effort: &[f64], position: &[f64], width: f64, step_s: f64) -> [Vec<f64>; 2] {
+    let acceleration = gaussian(position, width, 2).iter().map(|d| d / (step_s * step_s)).collect();
+    [gaussian(effort, width, 0), acceleration]
 }
 
 /// What effects in the drive may follow, with units, all logs on end.

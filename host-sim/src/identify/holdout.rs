@@ -6,7 +6,7 @@
 
 use super::balance::{Alternative, Balance, Company, Solved};
 use super::contact::log::ContactLog;
-use super::contact::problem::{Fit, Prediction, Problem, Role};
+use super::contact::problem::{Fit, Prediction, Problem, Role, WELL_KNOWN};
 use super::contact_part::{self, ContactPart};
 use super::drive::{self, Bearing, DriveLog, DriveScales};
 use super::effects::{self, DriveView, NormalLoadView};
@@ -283,18 +283,43 @@ fn known_forms<'f>(
     })
 }
 
+/// Errors of a part on the logs that it was fitted to.
+fn fitted_errors(names: &[String], part: &Linear, place: usize) -> Errors {
+    let solved = &part.solved[place];
+    let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(solved);
+    let forms: Vec<&Alternative> = solved.forms(&part.alternatives).map(|(form, _)| form).collect();
+    linear_errors(names, (&part.balance, &forms), [&none.residual, &solved.residual], (part, solved))
+}
+
+/// Errors of a part in the balance of other logs, in which its causes have these forms.
+fn foretold_errors(
+    names: &[String],
+    part: &Linear,
+    place: usize,
+    balance: &Balance,
+    fixed: &[Alternative],
+) -> Errors {
+    let solved = &part.solved[place];
+    let (base, extended) = extended_residual(part, place, balance, fixed);
+    let forms: Vec<&Alternative> = known_forms(part, solved, fixed).map(|(form, _)| form).collect();
+    linear_errors(names, (balance, &forms), [&base, &extended], (part, solved))
+}
+
 fn linear_errors(
     names: &[String],
-    balance: &Balance,
-    base: &[f64],
-    extended: &[f64],
-    (fitted, solved): (&Balance, &Solved),
+    (balance, forms): (&Balance, &[&Alternative]),
+    [base, extended]: [&[f64]; 2],
+    (part, solved): (&Linear, &Solved),
 ) -> Errors {
-    let noise = balance.noise_alone(fitted, &solved.residual);
+    let fitted_forms: Vec<&Alternative> = solved.forms(&part.alternatives).map(|(form, _)| form).collect();
+    let noise = balance.noise_alone(forms, (&part.balance, &fitted_forms), &solved.residual);
     let mut errors = Errors::default();
+    // As in the contact: instants that nothing tells, of a blow or of breaking away, show no law.
+    let limit = WELL_KNOWN * balance.rms(&balance.response);
     for (rows, name) in balance.rows_of_logs().iter().zip(names) {
         let points: Vec<Point> = rows
             .iter()
+            .filter(|&&i| noise[i] < limit)
             .map(|&i| Point {
                 signal: balance.response[i],
                 base: base[i],
@@ -318,19 +343,11 @@ fn drive_errors(
     let place = found.place(Part::Drive).unwrap_or(0);
     let names: Vec<String> = logs.iter().map(|log| log.source.clone()).collect();
     if training {
-        let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(&part.solved[place]);
-        return linear_errors(
-            &names,
-            &part.balance,
-            &none.residual,
-            &part.solved[place].residual,
-            (&part.balance, &part.solved[place]),
-        );
+        return fitted_errors(&names, part, place);
     }
     let logs = (logs, !found.linear_stage);
     let (balance, fixed) = drive_alternatives(part, &part.solved[place], logs, rig, told);
-    let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(&names, &balance, &base, &extended, (&part.balance, &part.solved[place]))
+    foretold_errors(&names, part, place, &balance, &fixed)
 }
 
 /// The balance of held-out logs of a rotary or a linear drive, and the forms of a solved set's causes there with the training logs'
@@ -402,14 +419,7 @@ fn normal_load_errors(
 ) -> Errors {
     let place = found.place(Part::Pressure).unwrap_or(0);
     if training {
-        let none = part.solved.iter().find(|s| s.set.is_empty()).unwrap_or(&part.solved[place]);
-        return linear_errors(
-            names,
-            &part.balance,
-            &none.residual,
-            &part.solved[place].residual,
-            (&part.balance, &part.solved[place]),
-        );
+        return fitted_errors(names, part, place);
     }
     let own_scales = NormalLoadScales::new(logs);
     let scales = part.normal_load_scales.as_ref().unwrap_or(&own_scales);
@@ -426,8 +436,7 @@ fn normal_load_errors(
         };
         fixed.extend(effects::with_id(own.effect).into_iter().flat_map(|e| e.normal_load(&view)));
     }
-    let (base, extended) = extended_residual(part, place, &balance, &fixed);
-    linear_errors(names, &balance, &base, &extended, (&part.balance, &part.solved[place]))
+    foretold_errors(names, part, place, &balance, &fixed)
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use super::drive::{Bearing, DriveLog, INERTIA};
 use super::effects::DriveView;
 use super::evidence::BALANCE_SHARE;
 use super::linear::{self, Slope};
+use super::noise::White;
 use super::term::Parameter;
 
 /// A mode turns by less than this in a step within a sample, rad: its frequency is then right to φ²/24, 6e-4.
@@ -35,6 +36,8 @@ const SPEED_PULL: f64 = 0.06;
 const SLOWER_THAN_MODE: f64 = 0.5;
 /// The torque says where the disc is where the coupling has more than this share of its stiffness.
 const STIFF: f64 = 0.3;
+/// So often noise is added to the sensors to see what of it a coupling lets through.
+const DRAWS: u64 = 4;
 /// Points of the grid from which a fit starts, its iterations, and step and longest move of the logarithms.
 const STARTS: usize = 3;
 const ITERATIONS: usize = 20;
@@ -49,9 +52,11 @@ fn judged(numbers: &Coupling, log: &DriveLog) -> f64 {
     PULL.min((std::f64::consts::TAU * numbers.mode_hz * log.grid.step_s).powi(2))
 }
 
-/// Shaft torque and angle of the disc for a log, which begins at this point of all.
+/// Shaft torque and angle of the disc for a log, which begins at this point of all, and where the torque does not tell where the
+/// disc lies in a gap with it at this share of the way from the middle to the motor's end.
 fn shaft_torque(
     (log, from): (&DriveLog, usize),
+    first_place: f64,
     law: &Law,
     bearing: &Bearing,
     pull: f64,
@@ -78,7 +83,8 @@ fn shaft_torque(
     // No smaller than what noise makes: inside the gap the torque is nothing.
     let sure = 0.1 * super::filters::rms(&observed);
     let x = &log.position;
-    let (mut q, mut w) = (x[0] - observed[0] / k, 0.0);
+    let place = if observed[0].abs() > sure { observed[0].signum() } else { first_place };
+    let (mut q, mut w) = (x[0] - observed[0] / k - place * law.half_gap, 0.0);
     let mut out = vec![0.0; n];
     let mut disc_position = vec![q; n];
     for i in 1..n {
@@ -143,7 +149,7 @@ fn alternative(
     let mut added = Vec::with_capacity(view.balance.response.len());
     let mut from = 0;
     for log in view.logs {
-        let (torque, _) = shaft_torque((log, from), &law, bearing, pull);
+        let (torque, _) = shaft_torque((log, from), 0.0, &law, bearing, pull);
         let bearing_nm = &bearing.torque_nm[from..from + log.len()];
         from += log.len();
         let most = 10.0 * view.scales.effort;
@@ -202,8 +208,11 @@ fn stated(
     numbers: &Coupling,
     bearing: &Bearing,
 ) -> Option<Alternative> {
-    let form = alternative(effect, view, numbers, bearing, judged(numbers, &view.logs[0]))?;
-    Some(reckoned(view, numbers, bearing, form))
+    let pull = judged(numbers, &view.logs[0]);
+    let form = alternative(effect, view, numbers, bearing, pull)?;
+    let law = numbers.law(view.inertia, view.scales.effort);
+    let noise_variance = noise_variance(view, &law, bearing, pull);
+    Some(reckoned(view, numbers, bearing, Alternative { noise_variance, ..form }))
 }
 
 /// The best plain coupling of a grid, and where one is asked for the best of each other shape.
@@ -290,6 +299,38 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> 
     [Some(plain), bent, staged].into_iter().flatten().filter_map(sharpened).collect()
 }
 
+/// Variance at each point that the sensors' noise leaves behind a coupling, beyond what the bridge's leaves in the balance without
+/// one. A disc on a spring that is hardly pulled to the measurement swings with the bridge's noise, blows of a coupling come at
+/// other instants, and where the disc lies in a gap when a log begins nothing tells before it is first struck.
+fn noise_variance(view: &DriveView<'_>, law: &Law, bearing: &Bearing, pull: f64) -> Vec<f64> {
+    let mut from = 0;
+    let mut out = Vec::with_capacity(view.balance.response.len());
+    for (at, log) in view.logs.iter().enumerate() {
+        let reckoned =
+            |log: &DriveLog, first_place: f64| shaft_torque((log, from), first_place, law, bearing, pull).0;
+        let filtered_change = |there: &[f64], here: &[f64]| {
+            log.filtered(&there.iter().zip(here).map(|(a, b)| a - b).collect::<Vec<f64>>())
+        };
+        let here = reckoned(log, 0.0);
+        let mut variance = vec![0.0; log.len()];
+        for draw in 0..DRAWS {
+            let noisier = log.noisier(&mut White::new(DRAWS * at as u64 + draw + 1));
+            let first_place = (2 * draw + 1) as f64 / DRAWS as f64 - 1.0;
+            let of_shaft = filtered_change(&reckoned(&noisier, first_place), &here);
+            let of_bridge = match (&noisier.friction, &log.friction) {
+                (Some(there), Some(here)) => filtered_change(there, here),
+                _ => vec![0.0; log.len()],
+            };
+            for ((sum, shaft), bridge) in variance.iter_mut().zip(of_shaft).zip(of_bridge) {
+                *sum += (shaft * shaft - bridge * bridge) / DRAWS as f64;
+            }
+        }
+        out.extend(log.filtered(&variance).into_iter().map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }));
+        from += log.len();
+    }
+    out
+}
+
 /// With the disc's motion in each way.
 fn reckoned(
     view: &DriveView<'_>,
@@ -301,7 +342,7 @@ fn reckoned(
     let logs: Vec<(&DriveLog, usize)> = view.logs.iter().zip(starts).collect();
     let law = numbers.law(view.inertia, view.scales.effort);
     let angles = |pull: f64| -> Vec<Vec<f64>> {
-        let of = |log: &(&DriveLog, usize)| shaft_torque(*log, &law, bearing, pull).1;
+        let of = |log: &(&DriveLog, usize)| shaft_torque(*log, 0.0, &law, bearing, pull).1;
         logs.iter().map(of).collect()
     };
     if let Some(disc) = &mut form.disc {
@@ -396,8 +437,9 @@ pub(super) mod tests {
     use super::*;
     use crate::identify::balance::Company;
     use crate::identify::drive::{self, DrivePrior, DriveScales};
+    use crate::identify::filters;
     use crate::identify::grid::Grid;
-    use crate::identify::noise::tests::white;
+    use crate::identify::noise::{self, tests::white};
 
     const INERTIA_KG_M2: f64 = 0.018;
     const DISC_KG_M2: f64 = 0.011;
@@ -515,7 +557,7 @@ pub(super) mod tests {
             // The torque is the same; how much of it follows the disc's speed is not.
             let torque_nm = drive::direction(&logs[0], scales.speed).iter().map(|s| coulomb * s).collect();
             let bearing = Bearing::new(torque_nm, &[0.0, coulomb_nm, 0.0], &scales);
-            let (shaft, _) = shaft_torque((&logs[0], 0), &law, &bearing, 0.01);
+            let (shaft, _) = shaft_torque((&logs[0], 0), 0.0, &law, &bearing, 0.01);
             let [effort, acceleration] = &logs[0].quick;
             let rest: Vec<f64> = (0..shaft.len())
                 .map(|i| effort[i] - law.motor_inertia * acceleration[i] - shaft[i])
@@ -551,6 +593,66 @@ pub(super) mod tests {
         let found = found("backlash", log, &[0.006, 0.012, 0.025, 0.05].map(of));
         // Stiffness and damping of blows that last some samples are not.
         assert_near(&found, "gap_rad", gap, 0.05);
+    }
+
+    /// Deviation that the sensors' noise leaves behind a coupling at each point of its log, beyond the bridge's in the balance.
+    fn noise_behind(log: DriveLog, numbers: &Coupling, pull: f64) -> Vec<f64> {
+        let logs = [log];
+        let scales = DriveScales::new(&logs);
+        let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
+        let bearing = Bearing::new(vec![0.0; balance.response.len()], &[0.0; 3], &scales);
+        let view = DriveView {
+            logs: &logs,
+            scales: &scales,
+            balance: &balance,
+            company: Company { forms: &[], residual: &[] },
+            rotary: true,
+            inertia: INERTIA_KG_M2,
+            fixed: None,
+            bearing: Some(&bearing),
+        };
+        let law = numbers.law(INERTIA_KG_M2, scales.effort);
+        noise_variance(&view, &law, &bearing, pull).iter().map(|v| v.sqrt()).collect()
+    }
+
+    /// A coupling of this stiffness and damping.
+    fn coupling(k: f64, d: f64) -> Coupling {
+        let omega = f64::sqrt(k / DISC_KG_M2);
+        Coupling::spring(omega / std::f64::consts::TAU, 0.5 * d * omega / k, DISC_KG_M2 / INERTIA_KG_M2)
+    }
+
+    #[test]
+    fn a_disc_on_a_soft_spring_swings_with_the_noise_of_the_bridge() {
+        let (k, d) = (40.0, 0.04);
+        let log = swinging_disc(|twist, rate| k * twist + d * rate);
+        let (sigma, width) = (noise::bridge_deviation(log.friction.as_ref().unwrap()), log.width);
+        let noise = filters::rms(&noise_behind(log, &coupling(k, d), 0.0));
+        // White noise through k / (k + i d ω − J ω²) and the balance's Gaussian, over what that leaves of the noise itself.
+        let step = 1e-5;
+        let passed = |i: usize| {
+            let omega = step * (i as f64 + 0.5);
+            let (real, imaginary) = (k - DISC_KG_M2 * (1e3 * omega).powi(2), d * 1e3 * omega);
+            let gain = (k * k + imaginary * imaginary) / (real * real + imaginary * imaginary);
+            (gain - 1.0) * (-(omega * width).powi(2)).exp()
+        };
+        let points = (std::f64::consts::PI / step) as usize;
+        let variance = (0..points).map(passed).sum::<f64>() * step / std::f64::consts::PI;
+        let there = sigma * variance.sqrt();
+        assert!((0.8..1.25).contains(&(noise / there)), "{noise} {there}");
+    }
+
+    #[test]
+    fn where_the_disc_lies_in_its_play_is_not_known_before_the_first_blow() {
+        let (k, gap, d) = (1100.0, 0.02, 0.5);
+        let log = swinging_disc(|twist: f64, rate| {
+            let overlap = (twist.abs() - 0.5 * gap).max(0.0) * twist.signum();
+            let carried = k * overlap + d * rate;
+            if overlap * carried > 0.0 { carried } else { 0.0 }
+        });
+        let noise = noise_behind(log, &Coupling { gap_rad: gap, ..coupling(k, d) }, PULL);
+        let usual = filters::rms(&noise);
+        let first_blow = noise[..noise.len() / 16].iter().copied().fold(0.0, f64::max);
+        assert!(first_blow > 5.0 * usual, "{first_blow} {usual}");
     }
 
     #[test]

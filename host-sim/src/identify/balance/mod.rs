@@ -60,6 +60,9 @@ pub struct Alternative {
     pub columns: Vec<Vec<f64>>,
     /// What is added to the response.
     pub response: Option<Vec<f64>>,
+    /// Variance at each point that noise of the sensors which that is reckoned from leaves in the balance, beyond what it has without
+    /// this form; empty where there is none.
+    pub noise_variance: Vec<f64>,
     /// Motion of the disc, where this form parts it from the motor's.
     pub disc: Option<DiscMotion>,
     /// Waves whose amplitude is the same in all logs: of each the places of cosine and sine among the parameters, log by log.
@@ -97,6 +100,7 @@ impl Alternative {
             parameters,
             columns,
             response: None,
+            noise_variance: Vec::new(),
             disc: None,
             same_amplitude: Vec::new(),
             base_shift: Vec::new(),
@@ -343,20 +347,26 @@ impl Balance {
 
     /// Deviation at each point that noise alone leaves, as `fitted`, a balance of logs of the same rig, tells of its sources, and
     /// of what is slow no more than a bridge's class allows: beyond that it is nothing of a sensor's. `residual` is what is left
-    /// there.
-    pub fn noise_alone(&self, fitted: &Self, residual: &[f64]) -> Vec<f64> {
-        let left = rest::over_named(&fitted.of_sensors(fitted), residual, &fitted.used);
-        self.of_sensors(fitted).into_iter().map(|deviation| left * deviation).collect()
+    /// there. Each with the forms that stand in it.
+    pub fn noise_alone(
+        &self,
+        forms: &[&Alternative],
+        (fitted, fitted_forms): (&Self, &[&Alternative]),
+        residual: &[f64],
+    ) -> Vec<f64> {
+        let left = rest::over_named(&fitted.of_sensors(fitted, fitted_forms), residual, &fitted.used);
+        self.of_sensors(fitted, forms).into_iter().map(|deviation| left * deviation).collect()
     }
 
     /// The same where the white noise of the channels is as large as it is said to be.
-    fn of_sensors(&self, fitted: &Self) -> Vec<f64> {
+    fn of_sensors(&self, fitted: &Self, forms: &[&Alternative]) -> Vec<f64> {
         let slow = (SLOW as f64 * fitted.slow_of_each).min(fitted.bridge_zero.powi(2));
-        let deviation = |squares: &[f64]| {
+        let deviation = |(i, squares): (usize, &[f64])| {
             let of_source = squares.iter().zip(&fitted.factors).map(|(n, a)| n * a.min(1.0));
-            (of_source.sum::<f64>() + slow).sqrt().max(1e-12)
+            let of_forms = forms.iter().filter_map(|form| form.noise_variance.get(i));
+            (of_source.chain(of_forms.copied()).sum::<f64>() + slow).sqrt().max(1e-12)
         };
-        self.sources.0.chunks(fitted.factors.len()).map(deviation).collect()
+        self.sources.0.chunks(fitted.factors.len()).enumerate().map(deviation).collect()
     }
 
     /// RMS over the used rows.
@@ -599,7 +609,7 @@ pub(super) mod tests {
                 let solved = fitted.solve(&[], &[]);
                 fitted.refit_noise(&solved);
                 let other = balance(noisy(100 + seed, white_sd, of_each));
-                noise += other.rms(&other.noise_alone(&fitted, &solved.residual)).powi(2);
+                noise += other.rms(&other.noise_alone(&[], (&fitted, &[]), &solved.residual)).powi(2);
                 there += other.rms(&other.response).powi(2);
             }
             [noise, there].map(|sum| (sum / 8.0).sqrt())

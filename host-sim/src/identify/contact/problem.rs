@@ -36,7 +36,7 @@ const SLOWEST_SLIP: f64 = 0.015;
 /// Drift of the root against the measured motion, relative to its usual speed: what the elements' way differs by.
 pub const DRIFT: f64 = 5e-4;
 /// A sample is well known where its deviation is less than this share of the usual torque.
-const WELL_KNOWN: f64 = 0.1;
+pub const WELL_KNOWN: f64 = 0.1;
 /// A step that gains less −ln posterior than this moves no value by more than a seventh of its deviation; so many at most.
 const SETTLED: f64 = 0.01;
 const MOST_SETTLING: usize = 20;
