@@ -109,24 +109,37 @@ impl<'a> Linearised<'a> {
     }
 }
 
-/// Samples that count as one to what is fitted: tr(V₀⁻¹V)/n, V the variance of the score from blocks and V₀ that of samples
-/// that are independent (Pauli, Racugno and Ventura 2011 scale a composite likelihood so). An error that repeats itself, as
-/// that of a swing between two samples does, has no slow part and yet says the same again and again.
+/// Samples that count as one to what is fitted: tr(V₀⁻¹V) over its expectation, V the variance of the score from blocks and V₀ that
+/// of samples that are independent (Pauli, Racugno and Ventura 2011 scale a composite likelihood so). An error that repeats
+/// itself, as that of a swing between two samples does, has no slow part and yet says the same again and again.
+///
+/// The score of all blocks together is nothing where the parameters were fitted, so that of n parameters and independent samples
+/// n − Σ_b tr((V₀⁻¹V_b)²) is expected, V_b what a block has of V₀: of nearly all of them where each is seen in many blocks, and of
+/// those that are seen in one nothing.
 pub(super) fn repeated(columns: &[Slope], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> f64 {
     let n = columns.len();
     let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
     let scaled: Vec<Vec<f64>> =
         columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
     let squares: Vec<f64> = score.iter().map(|s| s * s).collect();
-    let (independent, _) = linear::normal_equations(&scaled, &squares, r);
-    let blocks = blocks(lengths);
-    let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
-    let factor = linear::factor(&independent);
-    let sum = |block: std::ops::Range<usize>| -> f64 {
+    let of_block = |block: std::ops::Range<usize>| {
         let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
-        sum.dot(&factor.solve(&sum))
+        let columns: Vec<&[f64]> = scaled.iter().map(|column| &column[block.clone()]).collect();
+        let (independent, _) = linear::normal_equations(&columns, &squares[block.clone()], &r[block]);
+        (sum, independent)
     };
-    freedom * blocks.into_iter().map(sum).sum::<f64>() / n.max(1) as f64
+    let blocks: Vec<(DVector<f64>, DMatrix<f64>)> = blocks(lengths).into_iter().map(of_block).collect();
+    let independent = blocks.iter().fold(DMatrix::zeros(n, n), |sum, (_, own)| sum + own);
+    let factor = linear::factor(&independent);
+    let seen: f64 = blocks.iter().map(|(sum, _)| sum.dot(&factor.solve(sum))).sum();
+    let taken: f64 = blocks
+        .iter()
+        .map(|(_, own)| {
+            let share = factor.solve(own);
+            share.component_mul(&share.transpose()).sum()
+        })
+        .sum();
+    seen / (n as f64 - taken).max(1.0)
 }
 
 #[cfg(test)]
@@ -166,6 +179,27 @@ mod tests {
         let slow = share_below(SLOW_HZ, &wrong, 1e-3);
         let counts = of(&wrong);
         assert!(slow < 2.0 && counts > 20.0, "{slow} {counts}");
+    }
+
+    #[test]
+    fn independent_samples_count_as_one_each_to_however_many_parameters() {
+        let n = 8000;
+        let white = noise(n, 5);
+        let counts = |parameters: usize| {
+            let wave = |k: usize| (0..n).map(move |i| (0.05 * (k + 1) as f64 * i as f64).sin()).collect();
+            let columns: Vec<Slope> = (0..parameters).map(wave).collect();
+            let (h, g) = linear::normal_equations(&columns, &vec![1.0; n], &white);
+            let fitted = linear::factor(&h).solve(&g);
+            let left: Vec<f64> = (0..n)
+                .map(|i| white[i] - columns.iter().zip(fitted.iter()).map(|(c, p)| c[i] * p).sum::<f64>())
+                .collect();
+            repeated(&columns, &left, &[n], &vec![1.0; parameters])
+        };
+        // More than there are blocks, too.
+        for parameters in [8, 30, BLOCKS + 15] {
+            let counts = counts(parameters);
+            assert!((0.8..1.25).contains(&counts), "{parameters}: {counts}");
+        }
     }
 
     /// Of residuals of deviation 1 in one log that slides throughout.
