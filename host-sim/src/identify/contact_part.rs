@@ -65,6 +65,35 @@ pub struct DiscCause {
     pub effect: &'static str,
     /// Residuals of the baseline with the motion as logged, N m.
     pub residual_nm: Vec<f64>,
+    /// What it does in the contact: to the baseline.
+    pub contribution: Contribution,
+    /// ln evidence that the contact loses with the motion as logged.
+    lost: f64,
+}
+
+impl DiscCause {
+    /// A cause that parts the disc's motion from the encoder's, which stands in `logged`, with what that does to a baseline that was
+    /// fitted with the disc's.
+    fn new(parted: Parted, logged: &[ContactLog], problem: &Problem<'_>, ranked: &[Ranked]) -> Self {
+        let Parted { effect, way, residual_nm } = parted;
+        let as_logged = Problem::with_noise(logged, problem.baseline, &[], problem.noise.clone());
+        let left = search::baseline(&as_logged);
+        let none = ranked.iter().find(|r| r.fit.terms.is_empty());
+        let contribution = match none {
+            Some(none) => Ground::new(problem, &ranked[0].fit).of_motion(problem, &none.fit, &left),
+            None => Contribution::NOTHING,
+        };
+        let evidence = as_logged.log_evidence(&left)[1];
+        let lost = none.map_or(0.0, |none| (none.log_evidence - evidence).max(0.0));
+        Self { way, effect, residual_nm, contribution, lost }
+    }
+}
+
+/// What parts the disc's motion from the encoder's.
+struct Parted {
+    effect: &'static str,
+    way: [usize; 2],
+    residual_nm: Vec<f64>,
 }
 
 impl ContactPart {
@@ -77,13 +106,15 @@ impl ContactPart {
     ) -> Self {
         let block = baseline::has_block(model);
         let baseline = baseline::baseline(model, baseline::KNOWN_WITHIN).with_bridge_zeros(rig);
-        let (logs, disc_cause) = with_disc_motion(logs.to_vec(), &baseline, drive);
+        let logged = logs;
+        let (logs, parted) = with_disc_motion(logs.to_vec(), &baseline, drive);
         let scales = Scales::new(&logs);
         let terms = contact_terms(&logs, &scales, true, logs.len(), block);
         let mut problem = Problem::new(&logs, &baseline, &terms);
         let ranked = search::search(&mut problem, &[], progress).ranked;
         let contributions = contributions(&problem, &ranked);
         let tellers = tellers(&problem, &ranked);
+        let disc_cause = parted.map(|parted| DiscCause::new(parted, logged, &problem, &ranked));
         let noise = problem.noise.clone();
         Self { tellers, logs, scales, baseline, block, terms, noise, ranked, contributions, disc_cause }
     }
@@ -194,7 +225,8 @@ impl ContactPart {
         search::difference(&problem, &a.r, &b.r).hypot(of_friction).hypot(of_load)
     }
 
-    /// The sets found, for the table.
+    /// The sets found, for the table: where a cause in the drive moves the disc otherwise than the encoder says each with it, and
+    /// without it as the motion is logged.
     pub fn candidates(&self) -> Vec<Candidate> {
         // A sum of columns finds its shape, a law has one.
         let of_term = |term: &usize| {
@@ -204,11 +236,23 @@ impl ContactPart {
         };
         let of_set = |(place, (ranked, contributions)): (usize, (&Ranked, &Vec<Contribution>))| {
             let terms = ranked.fit.terms.iter().map(of_term).zip(contributions);
-            let effects = terms.map(|((effect, form), own)| (effect, form, *own));
+            let effects: Vec<_> = terms.map(|((effect, form), own)| (effect, form, *own)).collect();
             let tells = [Part::Drive, Part::Pressure].map(|by| (by, self.told(by, place)));
-            Candidate { tells: tells.into(), ..Candidate::new(place, ranked.log_evidence, effects) }
+            let candidate = |log_evidence: f64, effects: Vec<_>| Candidate {
+                tells: tells.to_vec(),
+                ..Candidate::new(place, log_evidence, effects.into_iter())
+            };
+            match &self.disc_cause {
+                None => vec![candidate(ranked.log_evidence, effects)],
+                Some(cause) => {
+                    let own = (cause.effect, LAW_FORM, cause.contribution);
+                    let with = effects.iter().copied().chain([own]).collect();
+                    let without = ranked.log_evidence - cause.lost;
+                    vec![candidate(ranked.log_evidence, with), candidate(without, effects)]
+                }
+            }
         };
-        self.ranked.iter().zip(&self.contributions).enumerate().map(of_set).collect()
+        self.ranked.iter().zip(&self.contributions).enumerate().flat_map(of_set).collect()
     }
 }
 
@@ -300,7 +344,7 @@ fn with_disc_motion(
     logs: Vec<ContactLog>,
     baseline: &Baseline,
     drive: Option<&Linear>,
-) -> (Vec<ContactLog>, Option<DiscCause>) {
+) -> (Vec<ContactLog>, Option<Parted>) {
     let parted = drive.and_then(|drive| {
         let best = drive.solved.first()?;
         let forms = best.forms(&drive.alternatives).map(|(form, places)| (form, &best.p[places]));
@@ -315,7 +359,7 @@ fn with_disc_motion(
         return (logs, None);
     }
     let way = [left[0].0, left.get(1).unwrap_or(&left[0]).0];
-    (known_by(&ways, way), Some(DiscCause { effect, way, residual_nm }))
+    (known_by(&ways, way), Some(Parted { effect, way, residual_nm }))
 }
 
 /// The fit of the set that is the likeliest with its prior and in which no cause is too small to be told: a channel has an end
@@ -439,24 +483,27 @@ mod tests {
         (0..COUNT).map(|i| ring.step(&mut state, torque(i))).collect()
     }
 
+    /// A log of 15 s of the assumed rubber that slides, whose friction channel has this noise beside white one.
+    fn sliding(noise_nm: &[f64], seed: u64) -> ContactLog {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let series = |of: &dyn Fn(f64) -> f64| (0..LONG).map(|i| of(STEP_S * i as f64)).collect();
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, series(&|t| t));
+        log.set_signal(Signal::M2Speed, series(&|t| 6.0 + 3.0 * (1.3 * t).sin()));
+        log.set_signal(Signal::NormalForce, series(&|t| 70.0 + 25.0 * (0.7 * t).sin()));
+        log.set_signal(Signal::FrictionTorque, vec![0.0; LONG]);
+        let inputs = ContactInputs::new(&log.contact().unwrap(), &rig);
+        let torque_nm = simulate_friction(&ModelFile::assumed(&[]).unwrap(), &rig, &inputs).unwrap();
+        let noise = noise_nm.iter().zip(white(LONG, seed)).map(|(slow, white)| slow + 0.02 * white);
+        log.set_signal(Signal::FrictionTorque, torque_nm.iter().zip(noise).map(|(t, e)| t + e).collect());
+        ContactLog::new(&log, &rig).unwrap()
+    }
+
     /// What an effect at its best gains in ln evidence on logs of 15 s whose friction channel has this noise beside white one.
     fn gained_by(effect: &str, noise_nm: &(dyn Fn(u64) -> Vec<f64> + Sync)) -> f64 {
         let rig = RigFile::assumed_rig(&[]).unwrap();
         let model = ModelFile::assumed(&[]).unwrap();
-        let log = |seed: u64| {
-            let series = |of: &dyn Fn(f64) -> f64| (0..LONG).map(|i| of(STEP_S * i as f64)).collect();
-            let mut log = Log::default();
-            log.set_signal(Signal::Time, series(&|t| t));
-            log.set_signal(Signal::M2Speed, series(&|t| 6.0 + 3.0 * (1.3 * t).sin()));
-            log.set_signal(Signal::NormalForce, series(&|t| 70.0 + 25.0 * (0.7 * t).sin()));
-            log.set_signal(Signal::FrictionTorque, vec![0.0; LONG]);
-            let inputs = ContactInputs::new(&log.contact().unwrap(), &rig);
-            let torque_nm = simulate_friction(&model, &rig, &inputs).unwrap();
-            let noise =
-                noise_nm(seed).into_iter().zip(white(LONG, seed)).map(|(slow, white)| slow + 0.02 * white);
-            log.set_signal(Signal::FrictionTorque, torque_nm.iter().zip(noise).map(|(t, e)| t + e).collect());
-            ContactLog::new(&log, &rig).unwrap()
-        };
+        let log = |seed: u64| sliding(&noise_nm(seed), seed);
         let logs = [1, 2].map(log);
         let baseline = baseline::baseline(&model, baseline::KNOWN_WITHIN).with_bridge_zeros(&rig);
         let terms: Vec<ContactTerm> = contact_terms(&logs, &Scales::new(&logs), true, 2, true)
@@ -507,6 +554,32 @@ mod tests {
         };
         let gained = gained_by("ring_resonance", &hum);
         assert!(gained < -LOG_PRIOR, "{gained}");
+    }
+
+    #[test]
+    fn a_motion_that_is_not_the_discs_costs_evidence_in_the_contact() {
+        let logs = [sliding(&vec![0.0; LONG], 1)];
+        let baseline = baseline::baseline(&ModelFile::assumed(&[]).unwrap(), baseline::KNOWN_WITHIN);
+        let problem = Problem::new(&logs, &baseline, &[]);
+        let fit = search::baseline(&problem);
+        let ranked = [Ranked { log_evidence: problem.log_evidence(&fit)[1], fit }];
+        // The encoder beside the disc swings about it at 5 Hz, as behind a soft shaft.
+        let cause = |swing_rad: f64| {
+            let swing = |i: usize| swing_rad * (std::f64::consts::TAU * 5.0 * STEP_S * i as f64).sin();
+            let angle_rad: Vec<f64> =
+                logs[0].angle_rad.iter().enumerate().map(|(i, angle)| angle + swing(i)).collect();
+            let logged = [logs[0].following(&angle_rad)];
+            let parted = Parted { effect: "shaft_torsion", way: [0, 1], residual_nm: Vec::new() };
+            DiscCause::new(parted, &logged, &problem, &ranked)
+        };
+        let [still, swings] = [cause(0.0), cause(0.05)];
+        assert!(still.lost < 0.5 && !still.contribution.is_told(), "{} {:?}", still.lost, still.contribution);
+        assert!(
+            swings.lost > 20.0 && swings.contribution.is_told(),
+            "{} {:?}",
+            swings.lost,
+            swings.contribution
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::contact::change::Change;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
 use super::contact::ringing::fast_line;
-use super::contact_part::{self, ContactPart};
+use super::contact_part::{self, ContactPart, DiscCause};
 use super::drive::{DriveLog, DrivePrior};
 use super::filters::rms;
 use super::law_form::LAW_FORM;
@@ -416,8 +416,14 @@ impl Judgement {
                 Part::Pressure => self.normal_load.as_ref()?.apart(a, b),
             })
         };
+        // One of them moves the disc otherwise than the encoder says.
+        let disc = self.contact.as_ref().and_then(|contact| contact.disc_cause.as_ref());
+        let parts_them = |cause: &&DiscCause| {
+            best.effects.contains(&cause.effect) != other.effects.contains(&cause.effect)
+        };
+        let moved = disc.filter(parts_them).map_or(0.0, |cause| cause.contribution.size);
         let most =
-            [Part::Friction, Part::Drive, Part::Pressure].into_iter().filter_map(apart).fold(0.0, f64::max);
+            [Part::Friction, Part::Drive, Part::Pressure].into_iter().filter_map(apart).fold(moved, f64::max);
         most < LAW_FORM * best.sizes[own]
     }
 
@@ -432,10 +438,7 @@ impl Judgement {
         let of_bridge = contact.as_mut().zip(drive).map_or(0.0, |(contact, (drive, place))| {
             contact.shared_with(&drive.balance, &drive.solved[place].residual)
         });
-        let contact = contact.map(|left| {
-            let disc_cause = self.contact.as_ref().and_then(|contact| contact.disc_cause.as_ref());
-            (Part::Friction, left.rest(disc_cause.filter(|c| hypothesis.effects.contains(&c.effect))))
-        });
+        let contact = contact.map(|left| (Part::Friction, left.rest(&hypothesis.effects)));
         let drive = drive.map(|(drive, place)| (Part::Drive, drive.rest(place, of_bridge)));
         let normal_load = self.normal_load.as_ref().zip(place(Part::Pressure));
         let pressure = normal_load.map(|(linear, place)| (Part::Pressure, linear.rest(place, 0.0)));

@@ -28,6 +28,8 @@ const MOST: f64 = 0.5;
 const LEFT_SHARE: f64 = 0.5;
 /// It is a trace where it is less than this share of the baseline's mean square: a fifth of its amplitude.
 const LEAST_SHARE: f64 = 0.05;
+/// What is left follows it where a bridge picks it up.
+pub(super) const MAINS: &str = "mains";
 /// Steepness of the steps over ln(ratio): a factor of 1.5 turns even odds into 25 to 1.
 const STEEPNESS: f64 = 8.0;
 
@@ -85,6 +87,9 @@ pub struct Contribution {
 }
 
 impl Contribution {
+    /// Of what does nothing.
+    pub const NOTHING: Self = Self { size: 0.0, over_rest: 0.0, known: MODEL_FORM };
+
     /// In the contact, from the size and the structured rests with and without it.
     fn new(size: f64, with: f64, without: f64, known: f64) -> Self {
         // Where nothing is structured without it either, its size alone is what is known of it.
@@ -144,6 +149,18 @@ impl Noise {
 /// Mean squares of means over blocks, less what noise leaves of them, which has so much of the bridge's slow noise. What stands in
 /// [`RARE`] of them alone does not count.
 fn structured(residual: &[f64], noise: &Noise, rows: &[usize], block: usize, of_bridge: f64) -> (f64, f64) {
+    beyond_noise(residual, noise, rows, block, of_bridge, RARE)
+}
+
+/// The same where what stands in this share of the blocks alone does not count.
+fn beyond_noise(
+    residual: &[f64],
+    noise: &Noise,
+    rows: &[usize],
+    block: usize,
+    of_bridge: f64,
+    rare: f64,
+) -> (f64, f64) {
     let (mut squares, mut left) = (Vec::with_capacity(rows.len() / block.max(1) + 1), 0.0);
     for chunk in rows.chunks(block) {
         if chunk.len() * 2 < block {
@@ -155,7 +172,7 @@ fn structured(residual: &[f64], noise: &Noise, rows: &[usize], block: usize, of_
         left += noise.of_mean(chunk);
     }
     let left = left / (squares.len() as f64).max(1.0) + of_bridge;
-    let lasting = squares.len() - (RARE * squares.len() as f64) as usize;
+    let lasting = squares.len() - (rare * squares.len() as f64) as usize;
     if lasting < squares.len() {
         squares.select_nth_unstable_by(lasting, f64::total_cmp);
         squares.truncate(lasting);
@@ -218,6 +235,15 @@ impl Ground {
             ],
             deviation,
         }
+    }
+
+    /// What another motion of the disc does to the baseline, fitted with that and as logged. A play tells in the moments after a
+    /// reversal, of which few samples are well known: what it explains counts wherever it does.
+    pub fn of_motion(&self, problem: &Problem<'_>, with: &Fit, as_logged: &Fit) -> Contribution {
+        let [with_nm, as_logged_nm] = [with, as_logged].map(|fit| rms(&self.in_units(&fit.r)));
+        let explained = (as_logged_nm.powi(2) - with_nm.powi(2)).max(0.0).sqrt() / self.signal;
+        let size = search::difference(problem, &with.r, &as_logged.r).max(explained);
+        Contribution::new(size, with_nm, as_logged_nm, MODEL_FORM)
     }
 
     fn in_units(&self, r: &[f64]) -> Vec<f64> {
@@ -314,9 +340,14 @@ impl<'c> LeftByContact<'c> {
         of_drive
     }
 
-    /// How large it is; `disc_cause` where the hypothesis has it.
-    pub fn rest(&self, disc_cause: Option<&DiscCause>) -> Rest {
+    /// How large it is where a cause that moves the disc is among these effects; without it the baseline has the motion as logged.
+    pub fn rest(&self, effects: &[&'static str]) -> Rest {
         let Self { contact, place, ground, residual_nm } = self;
+        let has = |cause: &&DiscCause| effects.contains(&cause.effect);
+        let disc_cause = contact.disc_cause.as_ref().filter(has);
+        let alone = contact.fit(*place).terms.is_empty();
+        let without = contact.disc_cause.as_ref().filter(|cause| alone && !has(cause));
+        let residual_nm = without.map_or(residual_nm, |cause| &cause.residual_nm);
         let problem = contact.problem();
         let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit.r);
         let fit = contact.fit(*place);
@@ -335,6 +366,18 @@ impl<'c> LeftByContact<'c> {
         let (rest, left) = ground.structured(residual_nm);
         let before =
             as_logged.as_ref().or(none).map_or(rest, |none| ground.structured(&ground.in_units(none)).0);
+        let mut follows = if rest > 0.0 {
+            follows(residual_nm, &ground.rows, ground.blocks[0], &contact_quantities(contact))
+        } else {
+            // Of what noise leaves nothing can be said to follow.
+            Vec::new()
+        };
+        // What the bridges pick up was taken off before anything was looked at.
+        let picked_up = picked_up(&contact.logs) * ground.signal.powi(2);
+        let [rest, before] = [rest, before].map(|square| square + picked_up);
+        if picked_up > 0.0 {
+            follows.insert(0, (MAINS.to_string(), picked_up / rest));
+        }
         Rest {
             size: rest.sqrt() / ground.signal,
             share: if before > 0.0 { (rest / before).min(1.0) } else { 0.0 },
@@ -342,14 +385,25 @@ impl<'c> LeftByContact<'c> {
             elsewhere: 0.0,
             times_noise: rest / left.max(1e-300),
             further_causes: 0,
-            follows: if rest > 0.0 {
-                follows(residual_nm, &ground.rows, ground.blocks[0], &contact_quantities(contact))
-            } else {
-                // Of what noise leaves nothing can be said to follow.
-                Vec::new()
-            },
+            follows,
         }
     }
+}
+
+/// Mean square of what a bridge picks up from the mains over that of what it shows, of the bridge where that is larger; less than what
+/// a model's form is known to is nothing.
+fn picked_up(logs: &[ContactLog]) -> f64 {
+    let of_bridge = |of: fn(&ContactLog) -> [&[f64]; 2]| {
+        let (mut line, mut shown) = (0.0, 0.0);
+        for [logged, clean] in logs.iter().map(of) {
+            line += logged.iter().zip(clean).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            shown += logged.iter().map(|x| x * x).sum::<f64>();
+        }
+        line / shown.max(f64::MIN_POSITIVE)
+    };
+    let friction = of_bridge(|log| [&log.logged_nm, &log.friction_nm]);
+    let normal = of_bridge(|log| [&log.logged_n, &log.normal_n]);
+    Some(friction.max(normal)).filter(|square| *square > MODEL_FORM * MODEL_FORM).unwrap_or(0.0)
 }
 
 fn contact_quantities(contact: &ContactPart) -> Vec<(String, Vec<f64>)> {
@@ -444,7 +498,15 @@ pub fn of_balance(
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
     let noise = Noise::white(balance.first_deviation.clone());
-    let of = |residual: &[f64]| structured(residual, &noise, &balance.used, block, of_bridge);
+    let lasting = |residual: &[f64]| structured(residual, &noise, &balance.used, block, of_bridge);
+    // What is rare is the tail of a cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
+    let named = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation);
+    let named = Noise::white(named.collect());
+    let of = |residual: &[f64]| {
+        let lasting = lasting(residual);
+        let each = beyond_noise(residual, &named, &balance.used, 1, of_bridge, 0.0);
+        if causes == 0 && each.0 > lasting.0 { each } else { lasting }
+    };
     let (rest, left) = of(residual);
     let before = none.map_or(rest, |none| of(none).0);
     Rest {
@@ -461,6 +523,9 @@ pub fn of_balance(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::log::Log;
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
     use crate::identify::balance::tests::white_log;
 
     const ROWS: usize = 2000;
@@ -494,6 +559,39 @@ mod tests {
         assert!(rest(10) < 1e-9, "{}", rest(10));
         // A fiftieth of the time lasts.
         assert!(rest(40) > 5.0, "{}", rest(40));
+    }
+
+    #[test]
+    fn what_a_bridge_picks_up_is_left_where_it_is_more_than_a_form() {
+        let of = |hum_nm: f64| {
+            let series = |of: &dyn Fn(f64) -> f64| (0..8000).map(|i| of(1e-3 * f64::from(i))).collect();
+            let mut log = Log::default();
+            log.set_signal(Signal::Time, series(&|t| t));
+            log.set_signal(Signal::M2Speed, series(&|_| 5.0));
+            log.set_signal(Signal::NormalForce, series(&|_| 60.0));
+            let hum = |t: f64| 2.0 + hum_nm * (std::f64::consts::TAU * 50.0 * t).sin();
+            log.set_signal(Signal::FrictionTorque, series(&hum));
+            picked_up(&[ContactLog::new(&log, &RigFile::assumed_rig(&[]).unwrap()).unwrap()])
+        };
+        assert_eq!(of(0.01), 0.0);
+        // A tenth of the torque, whose effective value is 1/√2 of that.
+        assert!((of(0.2).sqrt() - 0.1 / 2f64.sqrt()).abs() < 0.002, "{}", of(0.2));
+    }
+
+    #[test]
+    fn a_few_blows_are_the_tail_of_a_law_where_there_is_one() {
+        // Three of four hundred blocks have a row of four hundred times the noise.
+        const LONG: usize = 10 * ROWS;
+        let balance = Balance::new(vec![0.0; LONG], Vec::new(), &[white_log(LONG, 0.01)], 1.0);
+        let blows: Vec<f64> = (0..LONG).map(|i| if i % 6000 == 5000 { 4.0 } else { 0.0 }).collect();
+        let rest = |causes: usize| {
+            let none = (causes > 0).then(|| vec![0.3; LONG]);
+            of_balance(&balance, &blows, none.as_deref(), causes, 0.0, &[])
+        };
+        assert_eq!(rest(1).size, 0.0);
+        // 4 √(3/20 000), less the noise as far as it is known.
+        assert!((rest(0).size - 0.049).abs() < 0.005, "{}", rest(0).size);
+        assert!(rest(0).unknown() > 0.99 && rest(1).unknown() < 0.01);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::extended_model::Values;
 use super::holdout::{Errors, LogErrors};
 use super::judge::Judgement;
 use super::linear_part::Linear;
-use super::rest::NAMED_WITHIN;
+use super::rest::{self, NAMED_WITHIN};
 use super::table::{Hypothesis, Part, TooSmall};
 use crate::files::effect_id::subsystem_of;
 
@@ -454,6 +454,9 @@ fn next(judged: &Judgement, verdict: &str, groups: &[Vec<String>], apart: &[Apar
             let follows =
                 judged.rests.iter().flat_map(|(_, rest)| rest.follows.first()).map(|f| f.0.as_str()).next();
             match follows {
+                Some(rest::MAINS) => {
+                    "To see what the rest is: record with both motors off, and look after shield and ground of the bridges.".into()
+                }
                 Some(what) => format!("To see what the rest is: vary the {what} alone, everything else held."),
                 None => "To see what the rest is: repeat the same run twice; what does not repeat is no property of the rig.".into(),
             }
