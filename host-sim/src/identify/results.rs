@@ -140,7 +140,8 @@ impl Diagnosis {
         let best = judged.best();
         let marginal = |id: &str| -> f64 {
             let with = judged.hypotheses.iter().filter(|h| h.effects.contains(&id));
-            (1.0 - judged.unknown) * with.map(|h| h.probability).sum::<f64>()
+            // The sum of no numbers is −0.
+            (1.0 - judged.unknown) * with.fold(0.0, |sum, h| sum + h.probability)
         };
         let subsystems: BTreeMap<&'static str, Subsystem> =
             judged.rests.iter().map(|(part, _)| (part.name(), subsystem(found, *part))).collect();
