@@ -84,7 +84,9 @@ fn shaft_torque(
     let sure = 0.1 * super::filters::rms(&observed);
     let x = &log.position;
     let place = if observed[0].abs() > sure { observed[0].signum() } else { first_place };
-    let (mut q, mut w) = (x[0] - observed[0] / k - place * law.half_gap, 0.0);
+    // A soft stage says at any torque where the disc is.
+    let play = if law.is_play() { law.half_gap } else { 0.0 };
+    let (mut q, mut w) = (x[0] - observed[0] / k - place * play, 0.0);
     let mut out = vec![0.0; n];
     let mut disc_position = vec![q; n];
     for i in 1..n {
