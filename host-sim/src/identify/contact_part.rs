@@ -78,13 +78,10 @@ impl DiscCause {
         let Parted { effect, way, residual_nm } = parted;
         let as_logged = Problem::with_noise(logged, problem.baseline, &[], problem.noise.clone());
         let left = search::baseline(&as_logged);
-        let none = ranked.iter().find(|r| r.fit.terms.is_empty());
-        let contribution = match none {
-            Some(none) => Ground::new(problem, &ranked[0].fit).of_motion(problem, &none.fit, &left),
-            None => Contribution::NOTHING,
-        };
-        let evidence = as_logged.log_evidence(&left)[1];
-        let lost = none.map_or(0.0, |none| (none.log_evidence - evidence).max(0.0));
+        // The baseline is always among the sets.
+        let none = ranked.iter().find(|r| r.fit.terms.is_empty()).unwrap_or(&ranked[0]);
+        let contribution = Ground::new(problem, &ranked[0].fit).of_motion(problem, &none.fit, &left);
+        let lost = (none.log_evidence - as_logged.log_evidence(&left)[1]).max(0.0);
         Self { way, effect, residual_nm, contribution, lost }
     }
 }

@@ -87,9 +87,6 @@ pub struct Contribution {
 }
 
 impl Contribution {
-    /// Of what does nothing.
-    pub const NOTHING: Self = Self { size: 0.0, over_rest: 0.0, known: MODEL_FORM };
-
     /// In the contact, from the size and the structured rests with and without it.
     fn new(size: f64, with: f64, without: f64, known: f64) -> Self {
         // Where nothing is structured without it either, its size alone is what is known of it.
@@ -345,12 +342,11 @@ impl<'c> LeftByContact<'c> {
         let Self { contact, place, ground, residual_nm } = self;
         let has = |cause: &&DiscCause| effects.contains(&cause.effect);
         let disc_cause = contact.disc_cause.as_ref().filter(has);
-        let alone = contact.fit(*place).terms.is_empty();
-        let without = contact.disc_cause.as_ref().filter(|cause| alone && !has(cause));
+        let fit = contact.fit(*place);
+        let without = contact.disc_cause.as_ref().filter(|cause| fit.terms.is_empty() && !has(cause));
         let residual_nm = without.map_or(residual_nm, |cause| &cause.residual_nm);
         let problem = contact.problem();
         let none = contact.ranked.iter().find(|r| r.fit.terms.is_empty()).map(|r| &r.fit.r);
-        let fit = contact.fit(*place);
         let as_logged = disc_cause.map(|cause| {
             let over = cause.residual_nm.iter().zip(&problem.noise.deviation).zip(&fit.r);
             over.map(|((r, s), used)| if *used == 0.0 { 0.0 } else { r / s }).collect::<Vec<f64>>()
@@ -498,14 +494,16 @@ pub fn of_balance(
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
     let noise = Noise::white(balance.first_deviation.clone());
-    let lasting = |residual: &[f64]| structured(residual, &noise, &balance.used, block, of_bridge);
-    // What is rare is the tail of a cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
-    let named = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation);
-    let named = Noise::white(named.collect());
     let of = |residual: &[f64]| {
-        let lasting = lasting(residual);
-        let each = beyond_noise(residual, &named, &balance.used, 1, of_bridge, 0.0);
-        if causes == 0 && each.0 > lasting.0 { each } else { lasting }
+        let lasting = structured(residual, &noise, &balance.used, block, of_bridge);
+        if causes > 0 {
+            return lasting;
+        }
+        // What is rare is the tail of a cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it
+        // could be.
+        let named = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
+        let each = beyond_noise(residual, &Noise::white(named), &balance.used, 1, of_bridge, 0.0);
+        if each.0 > lasting.0 { each } else { lasting }
     };
     let (rest, left) = of(residual);
     let before = none.map_or(rest, |none| of(none).0);

@@ -52,6 +52,11 @@ fn judged(numbers: &Coupling, log: &DriveLog) -> f64 {
     PULL.min((std::f64::consts::TAU * numbers.mode_hz * log.grid.step_s).powi(2))
 }
 
+/// Logs, each with where it begins among the points of all.
+fn with_starts(logs: &[DriveLog]) -> impl Iterator<Item = (&DriveLog, usize)> {
+    logs.iter().scan(0, |from, log| Some((log, std::mem::replace(from, *from + log.len()))))
+}
+
 /// Shaft torque and angle of the disc for a log, which begins at this point of all, and where the torque does not tell where the
 /// disc lies in a gap with it at this share of the way from the middle to the motor's end.
 fn shaft_torque(
@@ -149,11 +154,9 @@ fn alternative(
     }
     let law = n.law(view.inertia, view.scales.effort);
     let mut added = Vec::with_capacity(view.balance.response.len());
-    let mut from = 0;
-    for log in view.logs {
+    for (log, from) in with_starts(view.logs) {
         let (torque, _) = shaft_torque((log, from), 0.0, &law, bearing, pull);
         let bearing_nm = &bearing.torque_nm[from..from + log.len()];
-        from += log.len();
         let most = 10.0 * view.scales.effort;
         let friction = log.friction.as_ref();
         let change: Vec<f64> = torque
@@ -214,7 +217,7 @@ fn stated(
     let form = alternative(effect, view, numbers, bearing, pull)?;
     let law = numbers.law(view.inertia, view.scales.effort);
     let noise_variance = noise_variance(view, &law, bearing, pull);
-    Some(reckoned(view, numbers, bearing, Alternative { noise_variance, ..form }))
+    Some(reckoned(view, &law, bearing, Alternative { noise_variance, ..form }))
 }
 
 /// The best plain coupling of a grid, and where one is asked for the best of each other shape.
@@ -305,9 +308,8 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> 
 /// one. A disc on a spring that is hardly pulled to the measurement swings with the bridge's noise, blows of a coupling come at
 /// other instants, and where the disc lies in a gap when a log begins nothing tells before it is first struck.
 fn noise_variance(view: &DriveView<'_>, law: &Law, bearing: &Bearing, pull: f64) -> Vec<f64> {
-    let mut from = 0;
     let mut out = Vec::with_capacity(view.balance.response.len());
-    for (at, log) in view.logs.iter().enumerate() {
+    for (at, (log, from)) in with_starts(view.logs).enumerate() {
         let reckoned =
             |log: &DriveLog, first_place: f64| shaft_torque((log, from), first_place, law, bearing, pull).0;
         let filtered_change = |there: &[f64], here: &[f64]| {
@@ -328,24 +330,14 @@ fn noise_variance(view: &DriveView<'_>, law: &Law, bearing: &Bearing, pull: f64)
             }
         }
         out.extend(log.filtered(&variance).into_iter().map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }));
-        from += log.len();
     }
     out
 }
 
 /// With the disc's motion in each way.
-fn reckoned(
-    view: &DriveView<'_>,
-    numbers: &Coupling,
-    bearing: &Bearing,
-    mut form: Alternative,
-) -> Alternative {
-    let starts = view.logs.iter().scan(0, |from, log| Some(std::mem::replace(from, *from + log.len())));
-    let logs: Vec<(&DriveLog, usize)> = view.logs.iter().zip(starts).collect();
-    let law = numbers.law(view.inertia, view.scales.effort);
+fn reckoned(view: &DriveView<'_>, law: &Law, bearing: &Bearing, mut form: Alternative) -> Alternative {
     let angles = |pull: f64| -> Vec<Vec<f64>> {
-        let of = |log: &(&DriveLog, usize)| shaft_torque(*log, 0.0, &law, bearing, pull).1;
-        logs.iter().map(of).collect()
+        with_starts(view.logs).map(|log| shaft_torque(log, 0.0, law, bearing, pull).1).collect()
     };
     if let Some(disc) = &mut form.disc {
         disc.angle_rad = RECKONED.map(angles).to_vec();
@@ -494,23 +486,32 @@ pub(super) mod tests {
         )
     }
 
+    /// What a form is looked for in: logs of a rotary drive, with nothing found yet.
+    fn view<'a>(
+        logs: &'a [DriveLog],
+        scales: &'a DriveScales,
+        balance: &'a Balance,
+        residual: &'a [f64],
+    ) -> DriveView<'a> {
+        DriveView {
+            logs,
+            scales,
+            balance,
+            company: Company { forms: &[], residual },
+            rotary: true,
+            inertia: INERTIA_KG_M2,
+            fixed: None,
+            bearing: None,
+        }
+    }
+
     /// Numbers of the best form.
     fn found(effect: &'static str, log: DriveLog, grid: &[Coupling]) -> Vec<(String, f64)> {
         let logs = [log];
         let scales = DriveScales::new(&logs);
         let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
         let residual = balance.solve(&[], &[]).residual;
-        let company = Company { forms: &[], residual: &residual };
-        let view = DriveView {
-            logs: &logs,
-            scales: &scales,
-            balance: &balance,
-            company,
-            rotary: true,
-            inertia: INERTIA_KG_M2,
-            fixed: None,
-            bearing: None,
-        };
+        let view = view(&logs, &scales, &balance, &residual);
         let forms = searched(effect, &view, grid.to_vec()).into_iter();
         let best = forms.max_by(|a, b| {
             let evidence = |form: &Alternative| balance.solve_forms(&[form]).log_evidence;
@@ -603,16 +604,7 @@ pub(super) mod tests {
         let scales = DriveScales::new(&logs);
         let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
         let bearing = Bearing::new(vec![0.0; balance.response.len()], &[0.0; 3], &scales);
-        let view = DriveView {
-            logs: &logs,
-            scales: &scales,
-            balance: &balance,
-            company: Company { forms: &[], residual: &[] },
-            rotary: true,
-            inertia: INERTIA_KG_M2,
-            fixed: None,
-            bearing: Some(&bearing),
-        };
+        let view = view(&logs, &scales, &balance, &[]);
         let law = numbers.law(INERTIA_KG_M2, scales.effort);
         noise_variance(&view, &law, &bearing, pull).iter().map(|v| v.sqrt()).collect()
     }
@@ -675,14 +667,9 @@ pub(super) mod tests {
             let told = Bearing::new(viscous.clone(), &[0.0, 0.0, 0.02], &scales);
             [told, Bearing::beside(&balance, &[], &scales)].map(|bearing| {
                 let view = DriveView {
-                    logs: &logs,
-                    scales: &scales,
-                    balance: &balance,
-                    company: Company { forms: &[], residual: &residual },
-                    rotary: true,
-                    inertia: INERTIA_KG_M2,
                     fixed: Some(&constants),
                     bearing: Some(&bearing),
+                    ..view(&logs, &scales, &balance, &residual)
                 };
                 let form = alternatives_of_grid("shaft_torsion", &view, Vec::new()).remove(0);
                 let added = form.response.expect("a coupling adds to the response");
