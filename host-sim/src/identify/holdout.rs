@@ -4,7 +4,7 @@
 //! the training logs' values. What belongs to one log alone, as the phase of a pattern under an incremental encoder, is
 //! not known for another one and left out.
 
-use super::balance::{Alternative, Balance, Company, Solved};
+use super::balance::{Alternative, Balance, Company, Solved, noise_variance_of};
 use super::contact::log::ContactLog;
 use super::contact::problem::{Fit, Prediction, Problem, Role, WELL_KNOWN};
 use super::contact_part::{self, ContactPart};
@@ -314,12 +314,13 @@ fn linear_errors(
     let fitted_forms: Vec<&Alternative> = solved.forms(&part.alternatives).map(|(form, _)| form).collect();
     let noise = balance.noise_alone(forms, (&part.balance, &fitted_forms), &solved.residual);
     let mut errors = Errors::default();
-    // As in the contact: instants that nothing tells, of a blow or of breaking away, show no law.
-    let limit = WELL_KNOWN * balance.rms(&balance.response);
+    // As in the contact: what a form says of instants that nothing tells, as that of a blow, is no law of it. A channel may be as noisy
+    // as it likes.
+    let limit = (WELL_KNOWN * balance.rms(&balance.response)).powi(2);
     for (rows, name) in balance.rows_of_logs().iter().zip(names) {
         let points: Vec<Point> = rows
             .iter()
-            .filter(|&&i| noise[i] < limit)
+            .filter(|&&i| noise_variance_of(forms, i) < limit)
             .map(|&i| Point {
                 signal: balance.response[i],
                 base: base[i],
@@ -463,26 +464,55 @@ mod tests {
         assert!((again / fitted - 1.0).abs() < 0.01, "{again} for {fitted}");
     }
 
-    #[test]
-    fn a_slow_log_is_foretold_with_the_standstill_of_the_training_logs() {
+    /// A motor alone that swings by this speed at half a radian a second, with a bearing whose friction is all there from a tenth of a
+    /// rad/s on, and this noise of its torque.
+    fn turning(fastest_rad_s: f64, noise_nm: f64, seed: u64) -> DriveLog {
         const COUNT: usize = 16_000;
         const INERTIA_KG_M2: f64 = 0.02;
-        const NOISE_NM: f64 = 0.004;
-        // A bearing whose friction is all there from a tenth of a rad/s on.
-        let log = |fastest_rad_s: f64, seed: u64| {
-            let time: Vec<f64> = (0..COUNT).map(|i| 1e-3 * i as f64).collect();
-            let (omega, noise) = (0.5, white(COUNT, seed));
-            let torque = |(t, n): (&f64, f64)| {
-                let speed = fastest_rad_s * (omega * t).sin();
-                let inertial = INERTIA_KG_M2 * fastest_rad_s * omega * (omega * t).cos();
-                inertial + 0.4 * (speed / 0.03).tanh() + NOISE_NM * n
-            };
-            let effort = time.iter().zip(noise).map(torque).collect();
-            let position = time.iter().map(|t| -fastest_rad_s / omega * (omega * t).cos()).collect();
-            let grid = Grid::new(&time);
-            let usable = grid.covered.clone();
-            DriveLog::made("log".into(), grid, effort, position, None, None, usable, INERTIA_KG_M2)
+        let time: Vec<f64> = (0..COUNT).map(|i| 1e-3 * i as f64).collect();
+        let (omega, noise) = (0.5, white(COUNT, seed));
+        let torque = |(t, n): (&f64, f64)| {
+            let speed = fastest_rad_s * (omega * t).sin();
+            let inertial = INERTIA_KG_M2 * fastest_rad_s * omega * (omega * t).cos();
+            inertial + 0.4 * (speed / 0.03).tanh() + noise_nm * n
         };
+        let effort = time.iter().zip(noise).map(torque).collect();
+        let position = time.iter().map(|t| -fastest_rad_s / omega * (omega * t).cos()).collect();
+        let grid = Grid::new(&time);
+        let usable = grid.covered.clone();
+        DriveLog::made("log".into(), grid, effort, position, None, None, usable, INERTIA_KG_M2)
+    }
+
+    #[test]
+    fn instants_that_a_form_cannot_know_are_left_out_and_a_noisy_channel_is_not() {
+        let part = linear_part::search_drive(&[turning(20.0, 1.0, 1)], &DrivePrior::default(), true);
+        let place = part.solved.iter().position(|solved| solved.set.is_empty()).unwrap();
+        let names = ["log".to_string()];
+        let [_, extended, noise] = fitted_errors(&names, &part, place).nrmse().expect("rows");
+        assert!(noise > 2.0 * WELL_KNOWN && (extended / noise - 1.0).abs() < 0.1, "{extended} {noise}");
+        // Where the form is uncertain by as much as is left, all of it is left out.
+        let points = part.balance.response.len();
+        let fifth = 0.2 * part.balance.rms(&part.balance.response);
+        let error = |noise_variance: Vec<f64>| {
+            let columns = Alternative::columns("coupling", Vec::new(), Vec::new());
+            let form = Alternative { noise_variance, ..columns };
+            let left = early(points, fifth);
+            let residuals: [&[f64]; 2] = [&vec![1.0; points], &left];
+            linear_errors(&names, (&part.balance, &[&form]), residuals, (&part, &part.solved[place])).nrmse()
+        };
+        assert_eq!(error(early(points, fifth.powi(2))).map(|e| e[1]), Some(0.0));
+        assert!(error(Vec::new()).is_some_and(|e| e[1] > 0.1));
+    }
+
+    /// This value at the first half of the points, and nothing after it.
+    fn early(points: usize, value: f64) -> Vec<f64> {
+        (0..points).map(|i| if i < points / 2 { value } else { 0.0 }).collect()
+    }
+
+    #[test]
+    fn a_slow_log_is_foretold_with_the_standstill_of_the_training_logs() {
+        const NOISE_NM: f64 = 0.004;
+        let log = |fastest_rad_s: f64, seed: u64| turning(fastest_rad_s, NOISE_NM, seed);
         let part = linear_part::search_drive(&[log(20.0, 1)], &DrivePrior::default(), true);
         let place = part.solved.iter().position(|solved| solved.set.is_empty()).unwrap();
         let (balance, fixed) =

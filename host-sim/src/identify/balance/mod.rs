@@ -215,6 +215,11 @@ impl Solved {
     }
 }
 
+/// Variance at a point that noise of the sensors leaves of what these forms are reckoned from.
+pub fn noise_variance_of(forms: &[&Alternative], point: usize) -> f64 {
+    forms.iter().filter_map(|form| form.noise_variance.get(point)).sum()
+}
+
 /// Forms with the places of their parameters, which stand one form after the other behind those of the base.
 fn placed<'f>(
     forms: impl Iterator<Item = &'f Alternative>,
@@ -363,8 +368,7 @@ impl Balance {
         let slow = (SLOW as f64 * fitted.slow_of_each).min(fitted.bridge_zero.powi(2));
         let deviation = |(i, squares): (usize, &[f64])| {
             let of_source = squares.iter().zip(&fitted.factors).map(|(n, a)| n * a.min(1.0));
-            let of_forms = forms.iter().filter_map(|form| form.noise_variance.get(i));
-            (of_source.chain(of_forms.copied()).sum::<f64>() + slow).sqrt().max(1e-12)
+            (of_source.sum::<f64>() + noise_variance_of(forms, i) + slow).sqrt().max(1e-12)
         };
         self.sources.0.chunks(fitted.factors.len()).enumerate().map(deviation).collect()
     }
