@@ -506,6 +506,7 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
     let friction_swings = log.friction.as_ref().map_or_else(|| vec![0.0; log.len()], |f| steps(f, log.width));
     let folded = BETWEEN_SAMPLES * white_share(log.width);
     let passed = white_share(log.width);
+    let unfiltered = passed.powi(-2);
     let of_effort = deviation_of(contact, &log.effort) * passed;
     let of_bridge = log.friction.as_ref().map_or(0.0, |friction| noise::bridge_deviation(friction) * passed);
     // Where the torque rests the base may leave the bridge's noise out: how much of it is then in a row the residuals tell, between
@@ -539,6 +540,7 @@ fn rows<'l>(log: &'l DriveLog, contact: bool, scales: &DriveScales) -> LogRows<'
         noise: Box::new(noise),
         guessed: Box::new(guessed),
         least: vec![in_means],
+        most: [vec![unfiltered, unfiltered, 1.0, 1.0], vec![unfiltered]],
     }
 }
 

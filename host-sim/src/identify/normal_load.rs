@@ -218,6 +218,7 @@ fn rows<'l>(log: &'l NormalLoadLog, gain: f64, scales: &NormalLoadScales) -> Log
         noise: Box::new(noise),
         guessed: Box::new(guessed),
         least: Vec::new(),
+        most: [vec![white_share(WIDTH).powi(-2), 1.0], Vec::new()],
     }
 }
 

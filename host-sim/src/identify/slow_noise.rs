@@ -21,6 +21,8 @@ const SHORTEST: usize = 16;
 const LEAST_PART: usize = 8;
 /// Longest ones, as a part of the shortest log: means of more than it are few, and what is fitted has taken of them.
 const LONGEST: usize = 4;
+/// Passes of the fit of the Allan variance: each has the weights of the last one's expectation.
+const PASSES: usize = 8;
 /// Variance of the process of a decade over the flat part.
 const OF_DECADE: f64 = std::f64::consts::LN_10 / (2.0 * std::f64::consts::LN_2);
 /// Time constants over the length of a block.
@@ -64,7 +66,9 @@ impl Errors<'_> {
         }
         let count = differences.len();
         let size = deviation_by_median(differences.into_iter());
-        (median_magnitude(white.into_iter()), 0.5 * size * size, count)
+        // The square of a number that is known so well is larger by its variance.
+        let larger = 1.0 + 0.25 * VARIANCE_OF_VARIANCE / count as f64;
+        (median_magnitude(white.into_iter()), 0.5 * size * size / larger, count)
     }
 
     /// Variance of the first-order process of a decade, as far as it is seen: what is less than its own deviation is not, since
@@ -79,18 +83,30 @@ impl Errors<'_> {
         self.level().0 * OF_DECADE
     }
 
-    /// Flat part of the Allan variance, and the variance of that.
+    /// Flat part of the Allan variance, and the variance of that: the likeliest, a variance being known to a share of what is
+    /// expected of it, the better the more differences it is taken from. A share of what was found would weigh a mean that happens
+    /// to be steady most.
     fn level(&self) -> (f64, f64) {
         let longest = self.lengths.iter().copied().min().unwrap_or(0) / LONGEST;
         let octaves = std::iter::successors(Some(SHORTEST), |m| Some(2 * m)).take_while(|m| *m <= longest);
-        let (mut h, mut g) = (DMatrix::zeros(2, 2), DVector::zeros(2));
-        for (white, found, count) in octaves.map(|m| self.allan(m)).filter(|(_, found, _)| *found > 0.0) {
-            // Relative to what is found: a variance is known to a share of it, the better the more there are.
-            let row = DVector::from_vec(vec![white, 1.0]) / found;
-            h += count as f64 * &row * row.transpose();
-            g += count as f64 * row;
+        let seen: Vec<_> = octaves.map(|m| self.allan(m)).filter(|(_, found, _)| *found > 0.0).collect();
+        let mut expected: Vec<f64> = seen.iter().map(|(_, found, _)| *found).collect();
+        let (mut h, mut level) = (DMatrix::zeros(2, 2), 0.0);
+        for _ in 0..PASSES {
+            h.fill(0.0);
+            let mut g = DVector::zeros(2);
+            for ((white, found, count), expected) in seen.iter().zip(&expected) {
+                let row = DVector::from_vec(vec![*white, 1.0]) / *expected;
+                h += *count as f64 * &row * row.transpose();
+                g += *count as f64 * found / expected * row;
+            }
+            let parts = linear::non_negative(&h, &g);
+            level = parts[1];
+            for (expected, (white, _, _)) in expected.iter_mut().zip(&seen) {
+                *expected = (parts[0] * white + level).max(f64::MIN_POSITIVE);
+            }
         }
-        (linear::non_negative(&h, &g)[1], linear::factor(&h).inverse()[(1, 1)] * VARIANCE_OF_VARIANCE)
+        (level, linear::factor(&h).inverse()[(1, 1)] * VARIANCE_OF_VARIANCE)
     }
 
     /// Covariance of the score Σ g_t e_t that slow noise e makes, for the gradients g of each parameter; a block has so many
@@ -129,8 +145,12 @@ mod tests {
     /// White noise of deviation 1, and first-order processes of this deviation a decade apart, shorter than a sample to
     /// longer than a log.
     fn residual(of_each: f64, white: &mut White) -> Vec<f64> {
+        of_lengths(LENGTHS, of_each, white)
+    }
+
+    fn of_lengths(lengths: [usize; 2], of_each: f64, white: &mut White) -> Vec<f64> {
         let mut all = Vec::new();
-        for length in LENGTHS {
+        for length in lengths {
             let constants = [5.0, 50.0, 500.0, 5000.0];
             let mut states = constants.map(|_| white.next());
             for _ in 0..length {
@@ -159,8 +179,26 @@ mod tests {
             assert!((0.5..1.5).contains(&ratio), "{of_each}: {ratio}");
         }
         // White noise alone mostly shows none: less than what a block leaves of it.
-        let mean = (0..8).map(|_| errors(&residual(0.0, &mut white), &ones).of_decade()).sum::<f64>() / 8.0;
+        let mean = (0..64).map(|_| errors(&residual(0.0, &mut white), &ones).of_decade()).sum::<f64>() / 64.0;
         assert!(mean < 0.1 / BLOCK, "{mean}");
+    }
+
+    #[test]
+    fn short_records_show_it_as_long_ones_do() {
+        // Four or eight differences of the longest means, which by chance may be small.
+        const SHORT: [usize; 2] = [1500, 1400];
+        const RECORDS: u32 = 100;
+        let ones = vec![1.0; 2900];
+        let mut white = White::new(11);
+        let (mut mean, mut unseen) = (0.0, 0);
+        for _ in 0..RECORDS {
+            let residual = of_lengths(SHORT, 0.5, &mut white);
+            let errors = Errors { residual: &residual, deviation: &ones, lengths: &SHORT };
+            let found = errors.likeliest_of_decade();
+            mean += found / f64::from(RECORDS);
+            unseen += u32::from(found == 0.0);
+        }
+        assert!((0.8..1.2).contains(&(mean / 0.25)) && unseen < 5, "{mean}, {unseen}");
     }
 
     #[test]

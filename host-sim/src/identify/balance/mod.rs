@@ -128,8 +128,11 @@ pub struct Balance {
     pub deviation: Vec<f64>,
     /// Deviation of each row before it was refitted: from named sources alone.
     pub first_deviation: Vec<f64>,
-    /// Squares of the sources at each point, point after point, and the least factor of each.
-    pub(super) sources: (Vec<f64>, Vec<f64>),
+    /// Squares of the sources at each point, point after point.
+    sources: Vec<f64>,
+    /// The least factor of each source's variance, and the largest that noise has.
+    least: Vec<f64>,
+    most: Vec<f64>,
     /// Factors of the sources and variance of each slow process, as refitted.
     factors: Vec<f64>,
     slow_of_each: f64,
@@ -170,6 +173,9 @@ pub struct LogRows<'l> {
     pub guessed: Box<dyn Fn(usize) -> Vec<f64> + 'l>,
     /// The least factor of a guessed source's variance, where more is known of it than nothing.
     pub least: Vec<f64>,
+    /// The largest factor of each known source's variance, and of the guessed ones of which the least is known, that noise has: a
+    /// filter may pass all of what a channel shows, if that is not white.
+    pub most: [Vec<f64>; 2],
 }
 
 /// Rows nearer to a point that is left out than so many widths are left out too: there the filter's weight has fallen to an
@@ -241,7 +247,7 @@ impl Balance {
     ) -> Self {
         let (mut deviation, mut used, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         let mut row_step_s = f64::INFINITY;
-        let (mut sources, mut least) = (Vec::new(), Vec::new());
+        let (mut sources, mut least, mut most) = (Vec::new(), Vec::new(), Vec::new());
         for log in logs {
             let (from, count) = (deviation.len(), log.left_out.len());
             starts.push(from);
@@ -251,6 +257,7 @@ impl Balance {
                 least =
                     [vec![1.0; known.len()], vec![variance_components::LEAST; unknown], log.least.clone()]
                         .concat();
+                most = [log.most[0].clone(), vec![1.0; unknown], log.most[1].clone()].concat();
                 let squares: Vec<f64> = known.iter().chain(&guessed).map(|n| n * n).collect();
                 deviation.push(squares.iter().sum::<f64>().sqrt().max(1e-12));
                 sources.extend(squares);
@@ -274,7 +281,9 @@ impl Balance {
             first_deviation,
             factors: vec![1.0; least.len()],
             slow_of_each: 0.0,
-            sources: (sources, least),
+            sources,
+            least,
+            most,
             used,
             scale,
             bridge_zero: 0.0,
@@ -363,14 +372,17 @@ impl Balance {
         self.of_sensors(fitted, forms).into_iter().map(|deviation| left * deviation).collect()
     }
 
-    /// The same where the white noise of the channels is as large as it is said to be.
+    /// The same where the noise of the channels is as large as they show it.
     fn of_sensors(&self, fitted: &Self, forms: &[&Alternative]) -> Vec<f64> {
         let slow = (SLOW as f64 * fitted.slow_of_each).min(fitted.bridge_zero.powi(2));
         let deviation = |(i, squares): (usize, &[f64])| {
-            let of_source = squares.iter().zip(&fitted.factors).map(|(n, a)| n * a.min(1.0));
+            let of_source = squares
+                .iter()
+                .zip(fitted.factors.iter().zip(&fitted.most))
+                .map(|(n, (a, most))| n * a.min(*most));
             (of_source.sum::<f64>() + noise_variance_of(forms, i) + slow).sqrt().max(1e-12)
         };
-        self.sources.0.chunks(fitted.factors.len()).enumerate().map(deviation).collect()
+        self.sources.chunks(fitted.factors.len()).enumerate().map(deviation).collect()
     }
 
     /// RMS over the used rows.
@@ -410,7 +422,7 @@ impl Balance {
 
     /// Takes the size of each guessed source from what a solved set leaves new in each row.
     fn refit_sources(&mut self, solved: &Solved) {
-        let (sources, least) = &self.sources;
+        let Self { sources, least, .. } = self;
         let of_row = |((point, deviation), new): ((usize, f64), f64)| Sample {
             sources: &sources[point * least.len()..][..least.len()],
             square: (new * deviation).powi(2),
@@ -470,6 +482,7 @@ pub(super) mod tests {
             noise: Box::new(move |_| vec![deviation]),
             guessed: Box::new(|_| Vec::new()),
             least: Vec::new(),
+            most: [vec![1.0], Vec::new()],
         }
     }
 
@@ -606,10 +619,11 @@ pub(super) mod tests {
             (0..ROWS).map(&mut next).collect()
         };
         // What is said of the noise and what there is, in logs other than those fitted.
-        let said = |white_sd: f64, of_each: f64, zero: f64| {
+        let said_of = |white_sd: f64, of_each: f64, zero: f64, most: f64| {
             let (mut noise, mut there) = (0.0, 0.0);
             for seed in 1..=8 {
                 let mut fitted = balance(noisy(seed, white_sd, of_each)).with_sensors(1, zero);
+                fitted.most = vec![most];
                 let solved = fitted.solve(&[], &[]);
                 fitted.refit_noise(&solved);
                 let other = balance(noisy(100 + seed, white_sd, of_each));
@@ -618,9 +632,13 @@ pub(super) mod tests {
             }
             [noise, there].map(|sum| (sum / 8.0).sqrt())
         };
+        let said = |white_sd: f64, of_each: f64, zero: f64| said_of(white_sd, of_each, zero, 1.0);
         for [noise, there] in [said(1.0, 0.0, 9.0), said(1.0, 2.0, 9.0)] {
             assert!((0.8..1.25).contains(&(noise / there)), "{noise} {there}");
         }
+        // Of a channel whose noise is not white a filter passes more than it would of white noise.
+        let [noise, there] = said_of(3.0, 0.0, 0.1, 16.0);
+        assert!((0.8..1.25).contains(&(noise / there)), "{noise} {there}");
         // A bridge wanders by no more than its zero is known to, and noise is no larger than it is known within.
         let bound = rest::NAMED_WITHIN * 1f64.hypot(0.1);
         for [noise, there] in [said(1.0, 2.0, 0.1), said(3.0, 0.0, 0.1)] {
