@@ -123,6 +123,7 @@ mod tests {
             late: 0.0,
             smoothed: &[],
             noise,
+            unsure_m_s: 0.0,
         }
     }
 

@@ -69,6 +69,8 @@ pub struct ContactLog {
     pub normal_noise_n: f64,
     /// Noise of the root's speed from sample to sample, m/s.
     pub speed_noise_m_s: f64,
+    /// What that speed is uncertain by beside it, m/s: of a disc that is reckoned and not seen.
+    pub unsure_m_s: f64,
     /// By how much the instants of the disc's logged angle jitter, s, where its speed was used for what is fast.
     pub jitter_s: Option<f64>,
     /// What is left of a jump as ringing that samples are too far apart to show: its RMS at the jump over the jump, and the share
@@ -131,6 +133,7 @@ impl ContactLog {
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
             speed_noise_m_s: radius_m * slope_noise_rad_s,
+            unsure_m_s: 0.0,
             jitter_s,
             m1_torque_nm: optional(Signal::M1Torque),
             m1_angle_rad: optional(Signal::M1Angle),
@@ -196,7 +199,11 @@ impl ContactLog {
     pub fn known_as_well_as(&self, other: &Self) -> Self {
         let pairs = self.root_speed_m_s.iter().zip(&other.root_speed_m_s);
         let error = rms(&pairs.map(|(a, b)| a - b).collect::<Vec<_>>());
-        Self { speed_noise_m_s: self.speed_noise_m_s.hypot(error), ..self.clone() }
+        Self {
+            speed_noise_m_s: self.speed_noise_m_s.hypot(error),
+            unsure_m_s: self.unsure_m_s.hypot(error),
+            ..self.clone()
+        }
     }
 
     /// The normal force where its bridge shows so much when nothing presses, N.

@@ -6,7 +6,7 @@
 //!
 //! solved exactly for a force that goes in straight lines between samples. Where the tip slips the law is evaluated at
 //! the observed slip, F = sgn(w) (F_N g(|w|) e^m + F_N a2 |w| + film); where it sticks F = k u + c V + branches, u integrated from
-//! the motion with a weak pull to the measurement, held below breakaway. The two are blended smoothly, since a switch
+//! the motion with a weak pull to the measurement (as much as the way moved is uncertain and the bridge wanders), held below breakaway. The two are blended smoothly, since a switch
 //! makes the likelihood rough: s is a product of sigmoids in the slip speed, in its ratio to the root's speed and in the
 //! force's size and sign. Bristles without a block need none of this (`bristles.rs`); a brush slips on where this sees none
 //! (`reset.rs`).
@@ -19,6 +19,7 @@
 //! Left out: what the force did between samples; slip that begins and ends within one.
 
 use super::law::Contact;
+use super::problem::DRIFT;
 use super::reset::Loose;
 use super::smoothing::{OBSERVED_OVER, widths};
 use crate::identify::filters::{gaussian, shifted, smoothed_flat};
@@ -36,6 +37,9 @@ const LEAST_FORCE: f64 = 0.3;
 const LIMIT_WIDTH: f64 = 1e-3;
 /// A share of the blend that is less is none: a millionth of the force is a thousandth of any noise.
 const NEGLIGIBLE: f64 = 1e-6;
+/// What a second adds to the variance of what is held, in that of the force's noise: 1/f noise half as large as the white noise has
+/// a twentieth of its variance in each of five decades, and renews those of them that are shorter.
+const WANDER: f64 = 0.1;
 /// A contact carries nothing below this share of the log's largest load.
 const LEAST_LOAD: f64 = 2e-3;
 
@@ -62,6 +66,8 @@ pub struct Drive<'a> {
     pub smoothed: &'a [u8],
     /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
     pub noise: (f64, f64),
+    /// What the root's speed is uncertain by beyond the encoder's noise, m/s.
+    pub unsure_m_s: f64,
 }
 
 impl Drive<'_> {
@@ -307,6 +313,10 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
     let force_noise_n = drive.noise.1.max(1e-12);
     let added = (k * drive.noise.0 * dt / force_noise_n).powi(2);
     let at_rest = steady_gain(added);
+    let per_way = (k * DRIFT / force_noise_n).powi(2);
+    let wanders = WANDER * dt;
+    let unsure = (k * drive.unsure_m_s * dt / force_noise_n).powi(2) + wanders;
+    let added_by = |way: f64| per_way * way * way + unsure;
     // Of a force beyond the end of the range it is known that it is friction, until the block has forgotten it.
     let forgets = block.transition[(0, 0)].powi(2);
     let mut lost = f64::from(u8::from(drive.at_end(0)));
@@ -394,7 +404,7 @@ pub fn observe(contact: &Contact, drive: &Drive<'_>) -> Observed {
                 let slipping = loaded * contact.curve.at(loose.slow_m_s);
                 sticking += breaks * (slipping.copysign(sticking) - sticking);
             }
-            let before = variance + added;
+            let before = variance + added_by(way);
             let gain = before / (1.0 + before);
             let pulled = gain * drive.innovation_n(i, sticking) / k;
             // A bound makes nothing more certain, nor does what stands in for what is beyond it.
@@ -548,6 +558,7 @@ pub(super) mod tests {
                 late,
                 smoothed: &smoothed,
                 noise: (1e-6, NOISE_N),
+                unsure_m_s: 0.0,
             };
             let seen = observe(&contact, &drive);
             let shown = shifted(&seen.force_n, -late);
@@ -596,6 +607,7 @@ pub(super) mod tests {
                 late: 0.0,
                 smoothed: &[],
                 noise: (1e-3, 0.15),
+                unsure_m_s: 0.0,
             };
             let seen = observe(&contact, &drive).force_n;
             let judged = (3..acts_n.len()).filter(|i| acts_n[0] < END_N || at_end[i - 3] == 0);
@@ -612,6 +624,35 @@ pub(super) mod tests {
             let late = off_n(&acts_n[from..], true, stands_in);
             assert!(late < 0.3, "{from}: {late}");
         }
+    }
+
+    /// A block at rest that relaxes: what is held follows only what the bridge may wander by, and a disc that is not seen.
+    #[test]
+    fn a_force_that_creeps_at_rest_is_no_motion() {
+        const STEP_S: f64 = 1e-3;
+        const CREEPS_N_PER_S: f64 = 1.0;
+        let contact = block(2e4, 100.0, Curve::new(|_| 0.6));
+        let force_n: Vec<f64> = (0..2000).map(|i| 15.0 - CREEPS_N_PER_S * STEP_S * f64::from(i)).collect();
+        let left_n = |unsure_m_s: f64| {
+            let drive = Drive {
+                step_s: STEP_S,
+                root_m: &[0.0; 2000],
+                load_n: &[50.0; 2000],
+                force_n: &force_n,
+                ends: None,
+                factor: None,
+                slip_threshold_m_s: 1e-3,
+                late: 0.0,
+                smoothed: &[],
+                noise: (3e-4, 0.15),
+                unsure_m_s,
+            };
+            observe(&contact, &drive).force_n[1999] - force_n[1999]
+        };
+        // A gain of a hundredth: a tenth of a second behind.
+        let (seen, reckoned) = (left_n(0.0), left_n(3e-3));
+        assert!((seen / (0.1 * CREEPS_N_PER_S) - 1.0).abs() < 0.1, "{seen}");
+        assert!(reckoned < 0.1 * seen, "{reckoned}");
     }
 
     /// A spring that slides at 10 mm/s under 10 N, its force logged with a noise of 0.15 N.
@@ -633,6 +674,7 @@ pub(super) mod tests {
                 late: 0.0,
                 smoothed: &[],
                 noise: (1e-5, 0.15),
+                unsure_m_s: 0.0,
             };
             let seen = observe(&contact, &drive).sliding;
             seen.iter().sum::<f64>() / seen.len() as f64

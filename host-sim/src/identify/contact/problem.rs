@@ -379,6 +379,7 @@ impl<'a> Problem<'a> {
                     log.speed_noise_m_s.max(DRIFT * usual),
                     log.friction_noise_nm.max(1e-12) / log.radius_m,
                 ),
+                unsure_m_s: log.unsure_m_s,
             };
             let mut observed = observe(&contact, &Drive { force_n: &force_n, ..drive });
             if let Some(ends) = ends.as_ref().filter(|ends| ends.iter().any(|end| *end != 0)) {

@@ -523,11 +523,11 @@ mod tests {
         log.set_signal(Signal::FrictionTorque, series(&|t| 2.5 * (30.0 * (2.0 * t).sin()).tanh()));
         let p: Vec<f64> = baseline.free.iter().map(|b| b.parameter.mean).collect();
         // The slip is observed from the torque: a few rounds make the two agree.
-        for round in 0..4 {
+        for round in 0..8 {
             let logs = [ContactLog::new(&log, &rig).unwrap()];
             let mut torque = Problem::new(&logs, &baseline, &[]).predict(&[], &p).shown_nm;
             let mut white = White::new(3);
-            if round == 3 {
+            if round == 7 {
                 torque.iter_mut().for_each(|torque| *torque += 0.01 * white.next());
             }
             log.set_signal(Signal::FrictionTorque, torque);
