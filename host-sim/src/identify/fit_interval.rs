@@ -211,11 +211,19 @@ mod tests {
 
     #[test]
     fn the_mean_of_white_noise_has_its_own_deviation() {
+        const RECORDS: u64 = 32;
         let n = 8000;
-        let c = of(&[vec![1.0; n].into()], &noise(n, 3), &[1.0]).covariance;
+        let ratio = |seed: u64| {
+            of(&[vec![1.0; n].into()], &noise(n, 100 + seed), &[1.0]).covariance[(0, 0)] * n as f64
+        };
+        let mut ratios: Vec<f64> = (0..RECORDS).map(ratio).collect();
+        ratios.sort_by(f64::total_cmp);
         // Forty blocks know a variance within 22 %, one deviation; Student's weights cost 1/0.93 on normal noise.
-        let ratio = c[(0, 0)] * n as f64;
-        assert!((0.5..1.8).contains(&ratio), "{ratio}");
+        let usual = ratios[ratios.len() / 2];
+        assert!((0.8..1.4).contains(&usual), "{usual}");
+        // White noise by chance looks slow in one record of six, by half of its variance on the mean of all.
+        let mean = ratios.iter().sum::<f64>() / RECORDS as f64;
+        assert!(mean < 2.0, "{mean}");
     }
 
     #[test]

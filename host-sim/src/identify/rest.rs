@@ -253,6 +253,13 @@ impl Ground {
         self.beyond(&self.noise, residual)
     }
 
+    /// Or what single samples have, however rare they are, where that is more. What is rare is the tail of a cause's law, as the blows
+    /// of a tooth are. Where nothing acts there is no law whose tail it could be.
+    fn or_rare(&self, lasting: (f64, f64), residual: &[f64]) -> (f64, f64) {
+        let each = beyond_noise(residual, &self.of_sample, &self.rows, 1, self.of_bridge[1], 0.0);
+        if each.0 > lasting.0 { each } else { lasting }
+    }
+
     /// The same beyond this noise of blocks.
     fn beyond(&self, noise: &Noise, residual: &[f64]) -> (f64, f64) {
         let of = |noise: &Noise, block: usize, of_bridge| {
@@ -359,9 +366,12 @@ impl<'c> LeftByContact<'c> {
             // What cannot be looked at is not explained.
             return Rest { size: 1.0, share: 1.0, ..Rest::default() };
         }
-        let (rest, left) = ground.structured(residual_nm);
-        let before =
-            as_logged.as_ref().or(none).map_or(rest, |none| ground.structured(&ground.in_units(none)).0);
+        let of = |residual_nm: &[f64]| {
+            let lasting = ground.structured(residual_nm);
+            if effects.is_empty() { ground.or_rare(lasting, residual_nm) } else { lasting }
+        };
+        let (rest, left) = of(residual_nm);
+        let before = as_logged.as_ref().or(none).map_or(rest, |none| of(&ground.in_units(none)).0);
         let mut follows = if rest > 0.0 {
             follows(residual_nm, &ground.rows, ground.blocks[0], &contact_quantities(contact))
         } else {
@@ -543,6 +553,34 @@ mod tests {
         noise.repeated.clear();
         let (rest, left) = structured(&residual, &noise, &rows, 50, 0.1);
         assert!((left - (0.09 / 50.0 + 0.1)).abs() < 1e-12 && (rest - (0.25 - left)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_few_blows_are_a_rest_of_the_contact_where_nothing_acts() {
+        const LONG: usize = 10 * ROWS;
+        let ground = Ground {
+            deviation: vec![0.1; LONG],
+            noise: Noise::white(vec![0.1; LONG]),
+            of_sample: Noise::white(vec![0.1 * NAMED_WITHIN; LONG]),
+            rows: (0..LONG).collect(),
+            blocks: blocks(1e-3),
+            of_bridge: [0.0; 2],
+            signal: 1.0,
+            classes: [0.01; 2],
+        };
+        // Twenty within a tenth of a second.
+        let residual = |size: f64| -> Vec<f64> {
+            let blow = |i: usize| if i < 100 && i.is_multiple_of(5) { size } else { 0.1 };
+            (0..LONG).map(|i| blow(i) * if i % 2 == 0 { 1.0 } else { -1.0 }).collect()
+        };
+        let of = |residual: &[f64]| {
+            let lasting = ground.structured(residual);
+            [lasting.0, ground.or_rare(lasting, residual).0]
+        };
+        let [lasting, with_rare] = of(&residual(30.0));
+        assert!(lasting < 1e-9 && with_rare > 0.5, "{lasting} {with_rare}");
+        // What is a few times as large as noise, and as rare, is its tail.
+        assert_eq!(of(&residual(0.5)), [0.0; 2]);
     }
 
     #[test]
