@@ -13,8 +13,9 @@ use rayon::prelude::*;
 
 use super::log::ContactLog;
 use super::noise::MODEL_FORM;
-use super::problem::{Fit, Near, Problem, Slopes, UNDECIDED};
+use super::problem::{FREEDOM, Fit, Near, Problem, Slopes, UNDECIDED};
 use crate::identify::evidence::{SCALES, log_mean_exp};
+use crate::identify::filters::rms;
 use crate::identify::fit_interval;
 use crate::identify::linear::{self, Slope};
 
@@ -262,8 +263,42 @@ fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, (keep, iterations): (usiz
     unique(fits.into_par_iter().map(again).collect())
 }
 
+/// The same with noise as large as what the baseline leaves, where that is in the tails of the distribution: there the cost has valleys
+/// that each leave out other samples, and a cause that is as large as the signal's tenth is not reached from the baseline.
+fn softened<'a>(problem: &Problem<'a>, base: &Fit) -> Option<Problem<'a>> {
+    let times = rms(&base.r);
+    (times > FREEDOM.sqrt()).then(|| {
+        let mut noise = problem.noise.clone();
+        noise.deviation.iter_mut().for_each(|deviation| *deviation *= times);
+        Problem::with_noise(problem.logs, problem.baseline, problem.terms, noise)
+    })
+}
+
 /// The best single terms, and for each nonlinear one the points where it stood after a few iterations.
 fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Vec<Option<Points>>) {
+    let soft = softened(problem, base);
+    let own = soft.as_ref().map(|soft| soft.fit(&[], base.p.clone(), ITERATIONS, Near::Nothing));
+    let hardened = |fits: Vec<Fit>| match &soft {
+        Some(soft) => {
+            let fits = fits.into_par_iter().map(|fit| rescaled(problem, fit, &soft.noise.deviation));
+            fits.map(|fit| problem.refitted(fit, 3)).collect()
+        }
+        None => fits,
+    };
+    let (best, known) = {
+        let (problem, base) = (soft.as_ref().unwrap_or(problem), own.as_ref().unwrap_or(base));
+        singles_beside(problem, denied, base, hardened)
+    };
+    (improved(problem, best, (10, 5)), known)
+}
+
+/// The same beside this baseline, the best ones and their laws each brought on by `hardened`.
+fn singles_beside(
+    problem: &Problem<'_>,
+    denied: &[usize],
+    base: &Fit,
+    hardened: impl Fn(Vec<Fit>) -> Vec<Fit>,
+) -> (Vec<Fit>, Vec<Option<Points>>) {
     let slopes = problem.slopes(&[], &base.p, &base.r);
     let first = |terms: Vec<usize>| -> Vec<Fit> {
         let starts: Vec<(usize, Vec<f64>)> = terms
@@ -287,13 +322,13 @@ fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Ve
             known[fit.terms[0]].get_or_insert_with(Vec::new).push(fit.p[base.p.len()..].to_vec());
         }
     }
-    let mut fits = improved(problem, tried, (16, 3));
+    let mut fits = unique(hardened(improved(problem, tried, (16, 3))));
     // The laws of the effects that lead: a law bends as its columns cannot.
     let leading: Vec<&str> =
         fits.iter().take(PARENTS).map(|fit| problem.terms[fit.terms[0]].effect).collect();
     let laws = |term: &usize| problem.terms[*term].law && leading.contains(&problem.terms[*term].effect);
-    fits.extend(first((0..problem.terms.len()).filter(laws).collect()));
-    (improved(problem, fits, (10, 5)), known)
+    fits.extend(hardened(first((0..problem.terms.len()).filter(laws).collect())));
+    (fits, known)
 }
 
 /// The set with each of its terms in the form that can be exported.
@@ -589,6 +624,28 @@ mod tests {
         let slopes = rescaled(&problem, fit, &before).slopes.unwrap();
         for (at, (kept, fresh)) in slopes.iter().zip(&fresh).enumerate() {
             assert!(dot(fresh, fresh) == 0.0 || alike(kept, fresh) > 0.9999, "{at}: {}", alike(kept, fresh));
+        }
+    }
+
+    /// The friction bridge's gain swings by an eighth: what the baseline leaves is sixteen times the noise.
+    #[test]
+    fn a_cause_is_reached_from_a_baseline_that_is_far_off() {
+        for (period_s, phase) in [(4.0, 0.0), (9.6, 1.95)] {
+            let (mut logs, baseline, _) = logged();
+            let turn = |i: usize| std::f64::consts::TAU * 1e-3 * i as f64 / period_s + phase;
+            for log in &mut logs {
+                for signal in [&mut log.friction_nm, &mut log.observed_nm] {
+                    signal.iter_mut().enumerate().for_each(|(i, nm)| *nm *= 1.0 + 0.12 * turn(i).sin());
+                }
+            }
+            let terms = contact_terms(&logs, &Scales::new(&logs), true, 1, true);
+            let problem = Problem::new(&logs, &baseline, &terms);
+            let base = super::baseline(&problem);
+            assert!(softened(&problem, &base).is_some());
+            let (found, _) = singles(&problem, &[], &base);
+            let [effect, form] = [terms[found[0].terms[0]].effect, terms[found[0].terms[0]].form];
+            assert!(found[0].cost < 0.1 * base.cost, "{period_s}: {} of {}", found[0].cost, base.cost);
+            assert_eq!((effect, form), ("bridge_drift", "friction wanders"), "{period_s}");
         }
     }
 
