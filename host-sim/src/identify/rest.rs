@@ -178,6 +178,19 @@ fn beyond_noise(
     ((usual - left).max(0.0), left)
 }
 
+/// What lasts, or what single samples have beyond this noise, however rare they are, where that is more. What is rare is the tail of a
+/// cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
+fn or_rare(
+    lasting: (f64, f64),
+    residual: &[f64],
+    of_sample: &Noise,
+    rows: &[usize],
+    of_bridge: f64,
+) -> (f64, f64) {
+    let each = beyond_noise(residual, of_sample, rows, 1, of_bridge, 0.0);
+    if each.0 > lasting.0 { each } else { lasting }
+}
+
 /// Samples in the blocks, the longest first.
 fn blocks(step_s: f64) -> [usize; 2] {
     BLOCKS_S.map(|s| (s / step_s).round().max(1.0) as usize)
@@ -253,11 +266,9 @@ impl Ground {
         self.beyond(&self.noise, residual)
     }
 
-    /// Or what single samples have, however rare they are, where that is more. What is rare is the tail of a cause's law, as the blows
-    /// of a tooth are. Where nothing acts there is no law whose tail it could be.
+    /// As [`or_rare`].
     fn or_rare(&self, lasting: (f64, f64), residual: &[f64]) -> (f64, f64) {
-        let each = beyond_noise(residual, &self.of_sample, &self.rows, 1, self.of_bridge[1], 0.0);
-        if each.0 > lasting.0 { each } else { lasting }
+        or_rare(lasting, residual, &self.of_sample, &self.rows, self.of_bridge[1])
     }
 
     /// The same beyond this noise of blocks.
@@ -509,11 +520,8 @@ pub fn of_balance(
         if causes > 0 {
             return lasting;
         }
-        // What is rare is the tail of a cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it
-        // could be.
         let named = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
-        let each = beyond_noise(residual, &Noise::white(named), &balance.used, 1, of_bridge, 0.0);
-        if each.0 > lasting.0 { each } else { lasting }
+        or_rare(lasting, residual, &Noise::white(named), &balance.used, of_bridge)
     };
     let (rest, left) = of(residual);
     let before = none.map_or(rest, |none| of(none).0);

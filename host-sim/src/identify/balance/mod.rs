@@ -253,11 +253,12 @@ impl Balance {
             starts.push(from);
             for i in 0..count {
                 let (known, guessed) = ((log.noise)(i), (log.guessed)(i));
-                let unknown = guessed.len() - log.least.len();
-                least =
-                    [vec![1.0; known.len()], vec![variance_components::LEAST; unknown], log.least.clone()]
-                        .concat();
-                most = [log.most[0].clone(), vec![1.0; unknown], log.most[1].clone()].concat();
+                if i == 0 {
+                    let unknown = guessed.len() - log.least.len();
+                    let nothing = vec![variance_components::LEAST; unknown];
+                    least = [vec![1.0; known.len()], nothing, log.least.clone()].concat();
+                    most = [log.most[0].clone(), vec![1.0; unknown], log.most[1].clone()].concat();
+                }
                 let squares: Vec<f64> = known.iter().chain(&guessed).map(|n| n * n).collect();
                 deviation.push(squares.iter().sum::<f64>().sqrt().max(1e-12));
                 sources.extend(squares);

@@ -6,10 +6,10 @@
 //!
 //! solved exactly for a force that goes in straight lines between samples. Where the tip slips the law is evaluated at
 //! the observed slip, F = sgn(w) (F_N g(|w|) e^m + F_N a2 |w| + film); where it sticks F = k u + c V + branches, u integrated from
-//! the motion with a weak pull to the measurement (as much as the way moved is uncertain and the bridge wanders), held below breakaway. The two are blended smoothly, since a switch
-//! makes the likelihood rough: s is a product of sigmoids in the slip speed, in its ratio to the root's speed and in the
-//! force's size and sign. Bristles without a block need none of this (`bristles.rs`); a brush slips on where this sees none
-//! (`reset.rs`).
+//! the motion with a weak pull to the measurement, held below breakaway: as much as the way moved is uncertain, the disc is
+//! reckoned and not seen, and the bridge wanders. The two are blended smoothly, since a switch makes the likelihood rough: s is a
+//! product of sigmoids in the slip speed, in its ratio to the root's speed and in the force's size and sign. Bristles without a
+//! block need none of this (`bristles.rs`); a brush slips on where this sees none (`reset.rs`).
 //!
 //! Nothing is integrated in open loop, so nothing loses phase through stick-slip.
 //!
@@ -64,7 +64,7 @@ pub struct Drive<'a> {
     pub late: f64,
     /// How widely the force is smoothed at each sample: places in [`widths`]; nothing where it is the least everywhere.
     pub smoothed: &'a [u8],
-    /// Noise of the root's speed, m/s, and of the force, N: they weigh motion against measurement where the tip sticks.
+    /// Noise of the root's speed, m/s, and of the force, N: what is held when a slip ends, and a slow slip, are known to that.
     pub noise: (f64, f64),
     /// What the root's speed is uncertain by beyond the encoder's noise, m/s.
     pub unsure_m_s: f64,

@@ -33,7 +33,8 @@ pub fn student_weight(r: f64) -> f64 {
 const BOUND: f64 = 3.0;
 /// Slip is faster than this share of the root's usual speed.
 const SLOWEST_SLIP: f64 = 0.015;
-/// Drift of the root against the measured motion, relative to its usual speed: what the elements' way differs by.
+/// Drift of the root against the measured motion, relative to its way while a tip sticks, else to its usual speed: what the elements'
+/// way differs by.
 pub const DRIFT: f64 = 5e-4;
 /// A sample is well known where its deviation is less than this share of the usual torque.
 pub const WELL_KNOWN: f64 = 0.1;

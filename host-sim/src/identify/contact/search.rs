@@ -162,9 +162,7 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
                 kept.extend(ranked.iter().find(|r| r.fit.terms.len() == size).map(|r| r.fit.clone()));
             }
         }
-        let again = |fit: Fit| problem.refitted(rescaled(problem, fit, &before), ITERATIONS);
-        let again = kept.into_par_iter().map(again).collect();
-        ranked = rank(problem, Vec::new(), again);
+        ranked = rank(problem, Vec::new(), refitted_from(problem, kept, &before, ITERATIONS));
         ranked = closed(problem, ranked);
         // The noise is that of the answer.
         if same_set(&ranked[0].fit.terms, &refitted_to) {
@@ -190,6 +188,12 @@ fn rescaled(problem: &Problem<'_>, mut fit: Fit, before: &[f64]) -> Fit {
         each.for_each(|((slope, before), after)| *slope *= before / after);
     }
     fit
+}
+
+/// Fits to residuals over these deviations, fitted on under the noise as it is.
+fn refitted_from(problem: &Problem<'_>, fits: Vec<Fit>, before: &[f64], iterations: usize) -> Vec<Fit> {
+    let again = |fit: Fit| problem.refitted(rescaled(problem, fit, before), iterations);
+    fits.into_par_iter().map(again).collect()
 }
 
 /// How many of the samples that swing count as one to what is fitted.
@@ -263,8 +267,8 @@ fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, (keep, iterations): (usiz
     unique(fits.into_par_iter().map(again).collect())
 }
 
-/// The same with noise as large as what the baseline leaves, where that is in the tails of the distribution: there the cost has valleys
-/// that each leave out other samples, and a cause that is as large as the signal's tenth is not reached from the baseline.
+/// The problem with noise as large as what the baseline leaves, where that is in the tails of the distribution: there the cost has
+/// valleys that each leave out other samples, and a cause as large as a tenth of the signal is not reached from the baseline.
 fn softened<'a>(problem: &Problem<'a>, base: &Fit) -> Option<Problem<'a>> {
     let times = rms(&base.r);
     (times > FREEDOM.sqrt()).then(|| {
@@ -279,10 +283,7 @@ fn singles(problem: &Problem<'_>, denied: &[usize], base: &Fit) -> (Vec<Fit>, Ve
     let soft = softened(problem, base);
     let own = soft.as_ref().map(|soft| soft.fit(&[], base.p.clone(), ITERATIONS, Near::Nothing));
     let hardened = |fits: Vec<Fit>| match &soft {
-        Some(soft) => {
-            let fits = fits.into_par_iter().map(|fit| rescaled(problem, fit, &soft.noise.deviation));
-            fits.map(|fit| problem.refitted(fit, 3)).collect()
-        }
+        Some(soft) => refitted_from(problem, fits, &soft.noise.deviation, 3),
         None => fits,
     };
     let (best, known) = {
