@@ -799,10 +799,16 @@ impl<'a> Problem<'a> {
         self.normal(&self.jacobian_of(fit), &fit.r, self.noise.counts(), |_, _| true)
     }
 
-    /// Takes the noise from what a fit leaves.
+    /// Takes the noise from what a fit leaves. What would leave no sample well known is no noise of a bench but what no cause
+    /// explains: it stays a residual.
     pub fn refit_noise(&mut self, fit: &Fit) {
         let slides = self.slides(fit);
-        self.noise.refit_coloured(self.logs, &fit.r, &slides);
+        let mut noise = self.noise.clone();
+        noise.refit_coloured(self.logs, &fit.r, &slides);
+        let limit = self.well_known_nm();
+        if noise.deviation.iter().any(|deviation| *deviation < limit) {
+            self.noise = noise;
+        }
     }
 
     /// Where the tip slides.

@@ -149,13 +149,17 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
     for _ in 0..2 {
         let refitted_to = ranked[0].fit.terms.clone();
         let before = problem.noise.deviation.clone();
+        // Beside noise so much smaller than what the best set leaves, it says little which sets lead: all stay, and those that lead
+        // now are looked beside again.
+        let far_off = softening(&ranked[0].fit).is_some();
         problem.refit_noise(&ranked[0].fit);
         // What repeats itself is told from what no cause explains by the set that explains most.
         if let Some(fullest) = ranked.iter().map(|r| &r.fit).min_by(|a, b| a.cost.total_cmp(&b.cost)) {
             let samples = repeated(problem, fullest);
             problem.noise.set_repeated(samples);
         }
-        let mut kept: Vec<Fit> = ranked.iter().take(FINALISTS).map(|r| r.fit.clone()).collect();
+        let kept = if far_off { ranked.len() } else { FINALISTS };
+        let mut kept: Vec<Fit> = ranked.iter().take(kept).map(|r| r.fit.clone()).collect();
         // The baseline and the best set of each size stay in the comparison.
         for size in 0..=3 {
             if !kept.iter().any(|fit| fit.terms.len() == size) {
@@ -163,6 +167,13 @@ pub fn search(problem: &mut Problem<'_>, denied: &[usize], progress: &(dyn Fn(&s
             }
         }
         ranked = rank(problem, Vec::new(), refitted_from(problem, kept, &before, ITERATIONS));
+        if far_off {
+            progress("larger sets");
+            let parents = ranked.iter().map(|r| &r.fit).filter(|fit| (1..3).contains(&fit.terms.len()));
+            let parents: Vec<Fit> = parents.take(2).cloned().collect();
+            let children = children(problem, denied, &parents, &known);
+            ranked = rank(problem, ranked, children);
+        }
         ranked = closed(problem, ranked);
         // The noise is that of the answer.
         if same_set(&ranked[0].fit.terms, &refitted_to) {
@@ -267,11 +278,16 @@ fn improved(problem: &Problem<'_>, mut fits: Vec<Fit>, (keep, iterations): (usiz
     unique(fits.into_par_iter().map(again).collect())
 }
 
+/// How many times the noise a fit leaves, where that is in the tails of the distribution.
+fn softening(fit: &Fit) -> Option<f64> {
+    let times = rms(&fit.r);
+    (times > FREEDOM.sqrt()).then_some(times)
+}
+
 /// The problem with noise as large as what the baseline leaves, where that is in the tails of the distribution: there the cost has
 /// valleys that each leave out other samples, and a cause as large as a tenth of the signal is not reached from the baseline.
 fn softened<'a>(problem: &Problem<'a>, base: &Fit) -> Option<Problem<'a>> {
-    let times = rms(&base.r);
-    (times > FREEDOM.sqrt()).then(|| {
+    softening(base).map(|times| {
         let mut noise = problem.noise.clone();
         noise.deviation.iter_mut().for_each(|deviation| *deviation *= times);
         Problem::with_noise(problem.logs, problem.baseline, problem.terms, noise)
@@ -626,6 +642,23 @@ mod tests {
         for (at, (kept, fresh)) in slopes.iter().zip(&fresh).enumerate() {
             assert!(dot(fresh, fresh) == 0.0 || alike(kept, fresh) > 0.9999, "{at}: {}", alike(kept, fresh));
         }
+    }
+
+    #[test]
+    fn what_would_leave_no_sample_well_known_is_no_noise() {
+        let (logs, baseline, terms) = logged();
+        let as_guessed = Problem::new(&logs, &baseline, &terms);
+        // This share of the torque itself is left.
+        let refitted = |share: f64| {
+            let mut problem = Problem::new(&logs, &baseline, &terms);
+            let mut left = fitted(&problem, &[], 1);
+            let torque = problem.measured().zip(&problem.noise.deviation);
+            left.r = torque.map(|(nm, deviation)| share * nm / deviation).collect();
+            problem.refit_noise(&left);
+            problem.noise.deviation
+        };
+        assert_ne!(refitted(0.02), as_guessed.noise.deviation);
+        assert_eq!(refitted(1.0), as_guessed.noise.deviation);
     }
 
     /// The friction bridge's gain swings by an eighth: what the baseline leaves is sixteen times the noise.
