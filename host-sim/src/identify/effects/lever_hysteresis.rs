@@ -22,6 +22,10 @@ const SHARE: &str = "usual_share";
 const SHORTEST: f64 = 0.01;
 const LONGEST: f64 = 0.25;
 
+/// Torque that the joints hold, relative to what goes through them: a friction coefficient of 0.3 on pins of a third of the lever's
+/// arm. With more, a band would stand in the gain's place and hide the force's noise.
+const JOINTS: f64 = 0.1;
+
 /// The force counts in shares of itself down to this share of the usual one, below which the elements come off.
 const LEAST_LOAD: f64 = 0.1;
 
@@ -107,7 +111,7 @@ impl Effect for LeverHysteresis {
             };
             let stops = Stops {
                 effect: self.id(),
-                size: 0.5 * s.torque_nm,
+                size: JOINTS * s.torque_nm,
                 units: [lagging.unit, "nm"],
                 column: &column,
                 deflection: Some(lagging.within),
@@ -145,7 +149,7 @@ impl LeverHysteresis {
         let travel_rad = moved.iter().map(|angle| travel(angle.iter().copied())).fold(0.0, f64::max);
         let spring = Spring {
             effect: self.id(),
-            size: 0.5 * view.scales.torque_nm,
+            size: JOINTS * view.scales.torque_nm,
             sliding: "sliding_nm",
             unit: "rad",
             column: &|way| {
