@@ -101,7 +101,7 @@ struct Arguments {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     collect: Vec<PathBuf>,
     /// Instead of diagnoses: so many fits of clean logs, and how many of their 95 % intervals hold the truth
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["case", "json_lines", "singles", "effects", "pairs", "outside", "none"])]
     fit_coverage: Option<usize>,
     /// Keep the cases and the results in this folder
     #[arg(long, value_name = "DIR")]
