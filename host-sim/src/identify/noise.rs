@@ -104,6 +104,12 @@ pub fn jitter(position: &[f64]) -> f64 {
     if fast > slow { (more.max(0.0) / (fast - slow)).sqrt() } else { 0.0 }
 }
 
+/// Deviation about the parabola in the middle one of windows of so many samples.
+pub fn usual_deviation(values: &[f64], window: usize) -> f64 {
+    let mut variances: Vec<f64> = values.chunks_exact(window).map(detrended_variance).collect();
+    if variances.is_empty() { detrended_variance(values).sqrt() } else { median(&mut variances).sqrt() }
+}
+
 /// Deviation in the quiet ones of these windows, or of all where there is none.
 fn quiet_deviation(values: &[f64], (quantile, deviate): (f64, f64), counts: impl Fn(&[f64]) -> bool) -> f64 {
     let windows = || values.chunks_exact(WINDOW);

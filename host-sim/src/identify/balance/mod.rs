@@ -122,6 +122,9 @@ pub struct Balance {
     pub base: Vec<(Parameter, Vec<f64>)>,
     /// Where the errors of the sensors begin among them: they stand last.
     pub sensors: usize,
+    /// Which of their columns has a sensor's noise in it, and the variances of the other noise and of that where the parameter is
+    /// what its prior says.
+    noisy_column: Option<(usize, [f64; 2])>,
     /// Which of them is the share of a sensor's noise that is left out.
     left_out_noise: Option<usize>,
     /// Deviation of each row, as refitted.
@@ -276,6 +279,7 @@ impl Balance {
         let mut balance = Self {
             response,
             sensors: base.len(),
+            noisy_column: None,
             left_out_noise: None,
             base,
             deviation,
@@ -329,6 +333,27 @@ impl Balance {
     #[must_use]
     pub fn with_sensors(self, sensors: usize, bridge_zero: f64) -> Self {
         Self { sensors, bridge_zero, ..self }
+    }
+
+    /// With a sensor's noise in this column of the base, `own` its deviation in the response where the parameter is what its prior
+    /// says, and that of the response itself.
+    #[must_use]
+    pub fn with_noise_in(self, place: usize, [own, of_response]: [f64; 2]) -> Self {
+        Self { noisy_column: Some((place, [of_response, own].map(|sd| sd * sd))), ..self }
+    }
+
+    /// By how much −ln likelihood is expected to be less where the parameter of a column with noise in it is smaller than its prior
+    /// says: the balance has less of that noise then, and nothing is explained (errors in variables; W. A. Fuller, *Measurement
+    /// Error Models*, 1987).
+    fn noise_avoided(&self, p: &[f64]) -> f64 {
+        let Some((place, [of_response, own])) = self.noisy_column else { return 0.0 };
+        let times = (p[place] / self.base[place].0.mean).powi(2).min(1.0);
+        let expected = |variance: f64| 0.5 * (FREEDOM + 1.0) * (variance / FREEDOM).ln_1p();
+        let of_row = |(_, deviation): (usize, f64)| {
+            let [all, left] = [1.0, times].map(|times| (of_response + times * own) / deviation.powi(2));
+            expected(all) - expected(left)
+        };
+        self.whitening.rows().map(of_row).sum::<f64>() / self.temper
     }
 
     /// With the base's parameter of this name as the share of a sensor's noise that is left out of the response.

@@ -184,7 +184,7 @@ impl Balance {
         let at = Expansion {
             p,
             parameters: &parameters,
-            misfit: misfit(innovations, self.temper),
+            misfit: misfit(innovations, self.temper) + self.noise_avoided(p),
             slope,
             curvature,
         };

@@ -22,7 +22,7 @@ const SHARE: &str = "usual_share";
 const SHORTEST: f64 = 0.01;
 const LONGEST: f64 = 0.25;
 
-/// Torque that the joints hold, relative to what goes through them: a friction coefficient of 0.3 on pins of a third of the lever's
+/// Torque that the joints hold at most, relative to what goes through them: a friction coefficient of 0.3 on pins of a third of the lever's
 /// arm. With more, a band would stand in the gain's place and hide the force's noise.
 const JOINTS: f64 = 0.1;
 
@@ -286,8 +286,8 @@ mod tests {
         });
         let left: Vec<(String, f64)> = left.collect();
         let of = |form: &str| left.iter().find(|(known, _)| known == form).unwrap().1;
-        // A quarter less than with either of what is measured.
-        assert!(of(CARRIED) < 0.75 * of(FORCE).min(of(TORQUE)), "{left:?}");
+        // A fifth less than with either of what is measured.
+        assert!(of(CARRIED) < 0.8 * of(FORCE).min(of(TORQUE)), "{left:?}");
         // The spring over the angle leaves less than that, with the way of the joints, but for swings that peak between samples.
         let spring = forms.last().unwrap();
         let way = STIFFNESS_N_PER_RAD * spring.constants[0].1;

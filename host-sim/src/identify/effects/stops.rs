@@ -46,7 +46,7 @@ pub(super) fn stop(values: &[f64], width: f64) -> Vec<f64> {
 pub(super) struct Stops<'s> {
     /// The effect's id.
     pub(super) effect: &'static str,
-    /// A large amplitude.
+    /// A large amplitude of their sum, of which each has its share: more stops are not more friction.
     pub(super) size: f64,
     /// Units of the widths and of the amplitudes, as names have them.
     pub(super) units: [&'static str; 2],
@@ -60,8 +60,8 @@ impl Stops<'_> {
     /// With these widths.
     pub(super) fn of_widths(&self, widths: &[f64]) -> Alternative {
         let [of_width, of_size] = self.units;
-        let parameter =
-            |i: usize| Parameter::positive(format!("sliding_at_width_{}_{of_size}", i + 1), self.size);
+        let own = self.size / (widths.len().max(1) as f64).sqrt();
+        let parameter = |i: usize| Parameter::positive(format!("sliding_at_width_{}_{of_size}", i + 1), own);
         let constant = |(i, width): (usize, &f64)| (format!("{WIDTH}{}_{of_width}", i + 1), *width);
         Alternative {
             constants: widths.iter().enumerate().map(constant).collect(),
