@@ -201,24 +201,23 @@ pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales)
     ];
     let rows: Vec<LogRows<'_>> = logs.iter().map(|log| rows(log, gain, scales)).collect();
     let zero_nm = bridge_zero::standard_deviations(rig)[1] / gain;
-    let response = concat(&|log| log.filtered(&log.torque_nm));
-    let noise_nm = noise_of_both(logs, gain);
-    Balance::new(response, base, &rows, scales.torque_nm)
+    let torque_nm: Vec<Vec<f64>> = logs.iter().map(|log| log.filtered(&log.torque_nm)).collect();
+    let noise_nm = noise_of_both(logs, &torque_nm, gain);
+    Balance::new(torque_nm.concat(), base, &rows, scales.torque_nm)
         .with_sensors(LATENESS, zero_nm)
         .with_noise_in(GAIN, noise_nm)
 }
 
-/// Noise of normal force and torque in the balance, N m. That of the force is not white: all counts that the torque does not have,
+/// Noise of normal force and torque in the balance, N m, from the logs and their filtered torques. That of the force is not white: all counts that the torque does not have,
 /// faster than what springs make slowly.
-fn noise_of_both(logs: &[NormalLoadLog], gain: f64) -> [f64; 2] {
-    let of_log = |log: &NormalLoadLog| {
-        let torque_nm = log.filtered(&log.torque_nm);
+fn noise_of_both(logs: &[NormalLoadLog], torque_nm: &[Vec<f64>], gain: f64) -> [f64; 2] {
+    let of_log = |(log, torque_nm): (&NormalLoadLog, &Vec<f64>)| {
         let apart: Vec<f64> = torque_nm.iter().zip(&log.filtered_n).map(|(nm, n)| nm - n / gain).collect();
         let all = noise::usual_deviation(&apart, (STEADY_S / log.step_s).ceil() as usize);
         let of_torque = white_share(WIDTH) * log.torque_noise_nm;
         [(all * all - of_torque * of_torque).max(0.0).sqrt(), of_torque]
     };
-    let each: Vec<[f64; 2]> = logs.iter().map(of_log).collect();
+    let each: Vec<[f64; 2]> = logs.iter().zip(torque_nm).map(of_log).collect();
     [0, 1].map(|which| rms(&each.iter().map(|log| log[which]).collect::<Vec<_>>()))
 }
 

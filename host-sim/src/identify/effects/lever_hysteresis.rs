@@ -22,8 +22,8 @@ const SHARE: &str = "usual_share";
 const SHORTEST: f64 = 0.01;
 const LONGEST: f64 = 0.25;
 
-/// Torque that the joints hold at most, relative to what goes through them: a friction coefficient of 0.3 on pins of a third of the lever's
-/// arm. With more, a band would stand in the gain's place and hide the force's noise.
+/// Torque that the joints hold at most, relative to what goes through them: a friction coefficient of 0.3 on pins of a third of
+/// the lever's arm. With more, a band would stand in the gain's place and hide the force's noise.
 const JOINTS: f64 = 0.1;
 
 /// The force counts in shares of itself down to this share of the usual one, below which the elements come off.
