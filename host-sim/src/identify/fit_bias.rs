@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, Fit, Near, Numbers, Problem};
+use super::fit_curve::along_curve;
 use super::fit_parameters::{set_all, values};
 use super::linear::factor;
 use super::noise::{White, standard_deviation};
@@ -44,6 +45,12 @@ pub(super) struct Resimulated<'a> {
 type Quiet = Vec<(Signal, Vec<f64>, f64)>;
 
 impl Resimulated<'_> {
+    /// Of the priors.
+    fn precision(&self) -> DVector<f64> {
+        let free = &self.baseline.free;
+        DVector::from_iterator(free.len(), free.iter().map(|base| base.parameter.sd.powi(-2)))
+    }
+
     fn quiet(&self, p: &[f64], raw: &Log, log: &ContactLog) -> Result<Quiet, InputError> {
         let mut model = self.model.clone();
         model.extensions.clear();
@@ -86,11 +93,16 @@ impl Resimulated<'_> {
         Ok(bridges.into_iter().chain(motion.into_iter().flatten()).collect())
     }
 
-    /// How far from `p` the likelihood's optimum is in logs with these numbers.
+    /// How far from `p` the optimum is in logs with these numbers, had the prior its mean there: shrinkage towards the mean that it
+    /// has moves what was found in the measured logs by as much, and is no bias of the observer's.
     fn bias(&self, measured: &Problem<'_>, p: &[f64]) -> Result<DVector<f64>, InputError> {
         let pairs: Vec<(&Log, &ContactLog)> = self.raw.iter().zip(measured.logs).collect();
         let quiet: Vec<Quiet> =
             pairs.par_iter().map(|(raw, log)| self.quiet(p, raw, log)).collect::<Result<_, InputError>>()?;
+        let priors = || self.baseline.free.iter().map(|base| &base.parameter);
+        let precision = self.precision();
+        let pull = DVector::from_iterator(p.len(), p.iter().zip(priors()).map(|(x, prior)| x - prior.mean))
+            .component_mul(&precision);
         let optimum = |sign: f64| -> Result<DVector<f64>, InputError> {
             let mut white = White::new(1);
             let mut logs = Vec::new();
@@ -105,7 +117,10 @@ impl Resimulated<'_> {
             let problem = Problem::new(&logs, self.baseline, &[]);
             let noise = problem.noise_at(&[], p).fitted_as(&logs, &measured.noise);
             let problem = Problem::with_noise(&logs, self.baseline, &[], noise);
-            Ok(DVector::from_vec(problem.fit(&[], p.to_vec(), STEPS, Near::Nothing).p))
+            let fit = along_curve(&problem, problem.fit(&[], p.to_vec(), STEPS, Near::Nothing));
+            let (h, _) = problem.normal_equations(&problem.jacobian_of(&fit), &fit.r);
+            let shrunk = factor(&(h + DMatrix::from_diagonal(&precision))).solve(&pull);
+            Ok(DVector::from_vec(fit.p) + shrunk)
         };
         let (plus, minus) = rayon::join(|| optimum(1.0), || optimum(-1.0));
         Ok(0.5 * (plus? + minus?) - DVector::from_column_slice(p))
@@ -122,19 +137,15 @@ impl Resimulated<'_> {
         progress: &(dyn Fn() + Sync),
     ) -> Result<Vec<f64>, InputError> {
         let at_found = DVector::from_column_slice(&found.p);
-        let sd = DVector::from_iterator(at_found.len(), self.baseline.free.iter().map(|b| b.parameter.sd));
-        // What these logs do not determine stays: the simulated ones determine it no more, and the prior is no bias.
         let columns = problem.jacobian(&[], &found.p, &found.r);
         let (h, _) = problem.normal_equations(&columns, &found.r);
-        let with_prior = &h + DMatrix::from_diagonal(&sd.map(|sd| sd.powi(-2)));
-        let with_prior = factor(&with_prior);
-        let determined = with_prior.solve(&h);
+        let with_prior = factor(&(h + DMatrix::from_diagonal(&self.precision())));
         let open = with_prior.inverse().diagonal().map(f64::sqrt);
         let converged = |missed_by: &DVector<f64>| missed_by.component_div(&open).amax() < CONVERGED;
         let mut p = at_found.clone();
         let missed = |p: &DVector<f64>| -> Result<DVector<f64>, InputError> {
             progress();
-            Ok(p + &determined * self.bias(problem, p.as_slice())? - &at_found)
+            Ok(p + self.bias(problem, p.as_slice())? - &at_found)
         };
         let mut missed_by = missed(&p)?;
         let mut best = (missed_by.norm(), p.clone());

@@ -15,10 +15,12 @@ use super::contact::problem::{Baseline, DRIFT, Fit, Near, Problem, Role};
 use super::contact::smoothing::OBSERVED_OVER;
 use super::filters::rms;
 use super::fit_bias::Resimulated;
+use super::fit_curve::{Likelihood, along_curve, slid_m_s};
 use super::fit_interval::Linearised;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
-use super::fit_profile::{Form, Profiles, profiles};
+use super::fit_profile::{Form, Told, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
+use super::linear;
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
 use crate::files::rig_file::RigFile;
@@ -148,7 +150,7 @@ fn converged(problem: &Problem<'_>, start: Vec<f64>, rounds: usize, progress: &(
     }
     for _ in 1..rounds {
         progress();
-        let next = problem.fit(&[], best.p.clone(), STEPS, Near::Nothing);
+        let next = along_curve(problem, problem.fit(&[], best.p.clone(), STEPS, Near::Nothing));
         let gained = best.cost - next.cost;
         best = next;
         if gained < CONVERGED {
@@ -211,11 +213,14 @@ pub fn identify(
 
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
-    let (mut likely, mut under_prior) = {
+    let (mut likely, mut under_prior, pretended) = {
         let slopes = problem.jacobian(&[], &fit.p, &fit.r);
         let linearised = Linearised::new(&problem, &fit, &slopes);
-        (linearised.known(&alone), linearised.known(&prior_sd).covariance)
+        let (mut h, _) = problem.normal_equations(&slopes, &fit.r);
+        alone.iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
+        (linearised.known(&alone), linearised.known(&prior_sd).covariance, linear::factor(&h).inverse())
     };
+    let observed = Likelihood::about(&problem, &fit);
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);
     let left = smoothed_rms(&left.collect::<Vec<_>>(), logs[0].grid.step_s);
@@ -231,29 +236,31 @@ pub fn identify(
         fit.p = resimulated.unbiased(&problem, &fit, progress)?;
     }
     let prediction = problem.predict(&[], &fit.p);
-    let slid = prediction.observed.iter().flat_map(|o| {
-        o.slip_m_s
-            .iter()
-            .zip(&o.sliding)
-            .filter(|(_, s)| **s > 0.5)
-            .map(|(w, _)| w.abs())
-            .filter(|w| *w > 0.0)
-    });
     let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
     let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
     let form = if by_simulation { Form::OF_SIMULATION } else { Form::BIAS_REMOVED };
     let known_to = (smoothing_s, DRIFT * usual_m_s, form);
     let logs_of = |p: &[f64]| DVector::from_vec(values(model, &baseline, p, free)).map(f64::ln);
-    let profiles = profiles(&baseline, (&fit.p, &found), &likely, slid.collect(), known_to, logs_of);
+    let to_log = log_derivatives(model, &baseline, &fit.p, free);
+    let told = if by_simulation {
+        Told::known(&baseline, &fit.p, &likely, slid_m_s(&problem, &fit.p))
+    } else {
+        observed.map(|likelihood| Told::observed(likelihood, &likely.covariance, &pretended, &to_log))
+    };
+    let about = Uncertain::about(
+        &values(model, &baseline, &fit.p, free),
+        &(&to_log * under_prior * to_log.transpose()),
+    );
     let before = values(model, &baseline, &found, free);
     let values = values(model, &baseline, &fit.p, free);
     let bias = before.iter().zip(&values).map(|(before, value)| before / value - 1.0).collect();
-    let uncertain = match profiles {
-        Some(profiles) => Uncertain::of_profiles(&values, &profiles),
-        None => {
-            let to_log = log_derivatives(model, &baseline, &fit.p, free);
-            Uncertain::about(&values, &(&to_log * under_prior * to_log.transpose()))
+    let uncertain = match told {
+        Some(told) => {
+            let deviations: Vec<f64> =
+                about.std.iter().zip(&values).map(|(std, value)| std / value).collect();
+            about.between(&values, &profiles(told, (&fit.p, &found), known_to, logs_of, &deviations))
         }
+        None => about,
     };
     let Uncertain { std, ends, correlations } = uncertain;
     let mut fitted = model.clone();
@@ -324,15 +331,15 @@ impl Uncertain {
         }
     }
 
-    /// From profiles of the posterior.
-    fn of_profiles(values: &[f64], known: &Profiles) -> Self {
-        let ends = || known.ends.iter().zip(values);
+    /// The same with these ends of the intervals, in ln.
+    fn between(self, values: &[f64], profiles: &[(f64, f64)]) -> Self {
+        let ends = || profiles.iter().zip(values);
         Self {
             std: ends().map(|((low, high), value)| value * (high - low) / (2.0 * INTERVAL_95)).collect(),
             ends: ends()
                 .map(|((low, high), value)| determined(low.exp().min(*value), high.exp().max(*value)))
                 .collect(),
-            correlations: correlations(&known.local),
+            ..self
         }
     }
 }

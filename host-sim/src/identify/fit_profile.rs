@@ -7,14 +7,14 @@
 //! (Venzon and Moolgavkar 1988). That costs no pass over the logs.
 //! Left out: what the law's form does between those speeds.
 
-use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
 
+use super::contact::baseline::KNOWN_WITHIN;
 use super::contact::problem::{Baseline, Role};
+use super::fit_curve::{Likelihood, Posterior, Seen, derivatives, is_of_curve, speeds};
 use super::fit_interval::Known;
 use super::linear;
 use crate::fit::covariance::INTERVAL_95;
-use crate::least_squares::Problem;
 
 /// Share of the correction for the observer's bias that is not known: the simulation that tells it has not all of the rig's
 /// noise; the deviation of an even distribution between none of it and twice it, 1/√3.
@@ -24,7 +24,7 @@ const CORRECTION_UNKNOWN: f64 = 0.58;
 pub(super) struct Form {
     /// Of the curve at each of the speeds.
     curve: f64,
-    /// Of the stiffness.
+    /// Of the stiffness; that of bristles in series with it is held, and known as well as a model file's numbers are.
     stiffness: f64,
     /// Of the damping, over the square of the smoothing's width in the block's time constant c/k: a response of variance τ² behind
     /// a filter of variance σ² has that of a τ longer by ½ σ²/τ².
@@ -38,8 +38,6 @@ impl Form {
     /// (means over bins of speed are off by 1e-4 to 4e-4 of the friction), and of the damping half of the worst.
     pub(super) const OF_SIMULATION: Self = Self { curve: 4e-4, stiffness: 1e-3, damping: 0.25 };
 }
-/// Step of differences.
-const STEP: f64 = 1e-4;
 /// How tightly a parameter is held where its profile is asked for, over its local deviation: what is read is where it came to be.
 const HELD: f64 = 0.01;
 /// A profile is followed so far, in ln: beyond a factor of e either way a parameter counts as not determined.
@@ -48,196 +46,132 @@ const FARTHEST: f64 = 2.0;
 const POINTS: usize = 12;
 /// The profile ends here within this share of [`INTERVAL_95`].
 const ENDS_WITHIN: f64 = 0.01;
+/// Share of the samples that slid slower than all speeds of the curve, and as many faster, where it is seen at no more than it has numbers.
+const OUTSIDE: f64 = 0.03;
 /// Singular values of the map to what is seen below this share of the largest: then no ridge can be followed.
 const LOST: f64 = 1e-7;
 
-/// Coordinates in which the likelihood is quadratic.
-struct Seen<'a> {
-    baseline: &'a Baseline,
-    speeds_m_s: Vec<f64>,
-}
+/// ln of a parameter of the file.
+type Log<'a> = &'a dyn Fn(&[f64]) -> f64;
 
-impl Seen<'_> {
-    fn is_curve(role: Role) -> bool {
-        matches!(role, Role::A0 | Role::A1 | Role::V0 | Role::Delta | Role::A2 | Role::Factor)
-    }
-
-    fn at(&self, p: &[f64]) -> DVector<f64> {
-        let n = self.baseline.numbers(p);
-        let curve = self
-            .speeds_m_s
-            .iter()
-            .map(|w| (n.a0 + n.a1 * (-(w / n.v0_m_s).powf(n.delta)).exp() + n.a2_s_per_m * w).ln());
-        let rest = (0..p.len())
-            .filter(|i| !Self::is_curve(self.baseline.free[*i].role))
-            .map(|i| self.baseline.bounded(p, i));
-        DVector::from_iterator(p.len(), curve.chain(rest))
-    }
-
-    /// How much ln g changes from a slip of this error, at each of the speeds.
-    fn of_slip_error(&self, p: &[f64], error_m_s: f64) -> Vec<f64> {
-        let there = self.at(p);
-        let moved = Seen {
-            baseline: self.baseline,
-            speeds_m_s: self.speeds_m_s.iter().map(|w| w + error_m_s).collect(),
-        };
-        let here = moved.at(p);
-        (0..self.speeds_m_s.len()).map(|i| here[i] - there[i]).collect()
-    }
-
-    fn derivatives(&self, p: &[f64]) -> DMatrix<f64> {
-        derivatives(p, |p| self.at(p))
-    }
-}
-
-/// A column for each value.
-fn derivatives(p: &[f64], of: impl Fn(&[f64]) -> DVector<f64>) -> DMatrix<f64> {
-    let moved = |i: usize, step: f64| {
-        let mut q = p.to_vec();
-        q[i] += step;
-        of(&q)
-    };
-    let column = |i: usize| (moved(i, STEP) - moved(i, -STEP)) / (2.0 * STEP);
-    DMatrix::from_columns(&(0..p.len()).map(column).collect::<Vec<_>>())
-}
-
-/// Speeds that stand for all at which the tip slid, one for each number of the curve.
-fn speeds(mut slid_m_s: Vec<f64>, count: usize) -> Option<Vec<f64>> {
-    /// Share of the samples left out at either end.
-    const OUTSIDE: f64 = 0.03;
-    slid_m_s.sort_by(f64::total_cmp);
-    let at = |share: f64| slid_m_s.get((share * slid_m_s.len() as f64) as usize).copied();
-    let (low, high) = (at(OUTSIDE)?, at(1.0 - OUTSIDE)?);
-    let share = |j: usize| j as f64 / count.saturating_sub(1).max(1) as f64;
-    (low > 0.0 && high > low).then(|| (0..count).map(|j| low * (high / low).powf(share(j))).collect())
-}
-
-/// What is known of the file's parameters, in ln.
-pub(super) struct Profiles {
-    /// Ends of the 95 % intervals.
-    pub(super) ends: Vec<(f64, f64)>,
-    /// Covariance at the top.
-    pub(super) local: DMatrix<f64>,
-}
-
-/// −ln of likelihood and prior as half a sum of squares.
-struct Posterior<'a, F> {
-    seen: Seen<'a>,
-    /// Top of the likelihood.
-    top: DVector<f64>,
-    /// Lower triangle of its covariance in what is seen.
-    spread: DMatrix<f64>,
-    /// ln of the file's parameters.
-    logs: F,
-}
-
-impl<F: Fn(&[f64]) -> DVector<f64>> Posterior<'_, F> {
-    fn residuals(&self, p: &[f64]) -> DVector<f64> {
-        let off = self.seen.at(p) - &self.top;
-        let likely = self.spread.solve_lower_triangular(&off).unwrap_or(off);
-        let free = &self.seen.baseline.free;
-        let prior = free.iter().zip(p).map(|(base, x)| (x - base.parameter.mean) / base.parameter.sd);
-        DVector::from_iterator(2 * p.len(), likely.iter().copied().chain(prior))
-    }
-
-    /// Best from here on, a parameter of the file held at a value in ln to this deviation where one is.
-    fn best(&self, from: &[f64], held: Option<(usize, f64, f64)>) -> Vec<f64> {
-        let residuals = |p: &[f64]| {
-            let r = self.residuals(p);
-            let held = held.map(|(which, value, sd)| ((self.logs)(p)[which] - value) / sd);
-            let count = r.len() + usize::from(held.is_some());
-            DVector::from_iterator(count, r.iter().copied().chain(held))
-        };
-        let problem = Problem {
-            at: DVector::from_column_slice(from),
-            residuals: |p: &DVector<f64>| Some(residuals(p.as_slice())),
-            jacobian: |p: &DVector<f64>| Some(derivatives(p.as_slice(), residuals)),
-        };
-        LevenbergMarquardt::new().minimize(problem).0.at.as_slice().to_vec()
-    }
-
-    /// Where the profile of a parameter ends in one direction.
-    fn end(&self, top: &[f64], which: usize, deviation: f64, direction: f64) -> f64 {
-        let least = self.residuals(top).norm_squared();
-        let centre = (self.logs)(top)[which];
-        let mut p = top.to_vec();
-        // Root of what it fell by, over how far away.
-        let mut last = (0.0, 0.0);
-        let mut away = INTERVAL_95 * deviation;
-        for _ in 0..POINTS {
-            away = away.min(FARTHEST);
-            p = self.best(&p, Some((which, centre + direction * away, HELD * deviation)));
-            let here = direction * ((self.logs)(&p)[which] - centre);
-            let fell = (self.residuals(&p).norm_squared() - least).max(0.0).sqrt();
-            if (fell - INTERVAL_95).abs() < ENDS_WITHIN * INTERVAL_95
-                || (away >= FARTHEST && fell < INTERVAL_95)
-            {
-                return centre + direction * here;
-            }
-            let slope = (fell - last.0) / (here - last.1);
-            let next = here + (INTERVAL_95 - fell) / slope;
-            last = (fell, here);
-            // A flat stretch says little of how far it goes.
-            away = if slope > 0.0 { next.clamp(0.5 * here, 2.0 * here) } else { 2.0 * here };
+/// Where the profile of a parameter ends in one direction.
+fn end(posterior: &Posterior<'_>, top: &[f64], of: Log<'_>, deviation: f64, direction: f64) -> f64 {
+    let least = posterior.residuals(top).norm_squared();
+    let centre = of(top);
+    let mut p = top.to_vec();
+    // Root of what it fell by, over how far away.
+    let mut last = (0.0, 0.0);
+    let mut away = INTERVAL_95 * deviation;
+    for _ in 0..POINTS {
+        away = away.min(FARTHEST);
+        let off = |p: &[f64]| (of(p) - centre - direction * away) / (HELD * deviation);
+        p = posterior.best(&p, Some(&off));
+        let here = direction * (of(&p) - centre);
+        let fell = (posterior.residuals(&p).norm_squared() - least).max(0.0).sqrt();
+        if (fell - INTERVAL_95).abs() < ENDS_WITHIN * INTERVAL_95 || (away >= FARTHEST && fell < INTERVAL_95)
+        {
+            return centre + direction * here;
         }
-        centre + direction * last.1
+        let slope = (fell - last.0) / (here - last.1);
+        let next = here + (INTERVAL_95 - fell) / slope;
+        last = (fell, here);
+        // A flat stretch says little of how far it goes.
+        away = if slope > 0.0 { next.clamp(0.5 * here, 2.0 * here) } else { 2.0 * here };
+    }
+    centre + direction * last.1
+}
+
+/// What a likelihood says in what is seen, and how much more uncertain each of the file's parameters is than it pretends.
+pub(super) struct Told<'a> {
+    pub(super) seen: Seen<'a>,
+    /// From where it was fitted to its top.
+    pub(super) to_top: DVector<f64>,
+    /// Its covariance.
+    pub(super) covariance: DMatrix<f64>,
+    /// Variance of each of the file's parameters, in ln, over what the covariance makes of it, where that is another.
+    pub(super) larger: Option<Vec<f64>>,
+}
+
+impl<'a> Told<'a> {
+    /// Of a likelihood whose samples are taken for independent ones; `likely` is what is known of the values when they are not, and
+    /// `pretended` their covariance when they are.
+    pub(super) fn observed(
+        likelihood: Likelihood<'a>,
+        likely: &DMatrix<f64>,
+        pretended: &DMatrix<f64>,
+        to_logs: &DMatrix<f64>,
+    ) -> Self {
+        let of_logs = |covariance: &DMatrix<f64>| (to_logs * covariance * to_logs.transpose()).diagonal();
+        let larger = of_logs(likely).component_div(&of_logs(pretended)).as_slice().to_vec();
+        let Likelihood { seen, to_top, covariance, .. } = likelihood;
+        Self { seen, to_top, covariance, larger: Some(larger) }
+    }
+
+    /// Of a covariance of the values that is as it is known, about values `p`. `None` where what is seen has no inverse, as in
+    /// sliding at one speed.
+    pub(super) fn known(
+        baseline: &'a Baseline,
+        p: &[f64],
+        known: &Known,
+        slid_m_s: Vec<f64>,
+    ) -> Option<Self> {
+        let count = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
+        let seen = Seen { baseline, speeds_m_s: speeds(slid_m_s, count, OUTSIDE)? };
+        let g = derivatives(p, |p| seen.at(p));
+        let singular = g.clone().svd(false, false).singular_values;
+        let ratio = singular.min() / singular.max();
+        let covariance = &g * &known.covariance * g.transpose();
+        (ratio > LOST).then(|| Self { seen, to_top: &g * &known.to_top, covariance, larger: None })
     }
 }
 
-/// What is known about the top `p`, which the likelihood had at `found` before its bias was taken off; `likely` is what the
-/// likelihood alone says there, for a slip that is smoothed over this width and known to this error, and `logs` gives the file's
-/// parameters. `None` where what is seen has no inverse, as in sliding at one speed.
+/// Ends of the 95 % intervals of the file's parameters, in ln, about the values `p`, which the likelihood had at `found` before its
+/// bias was taken off; for a slip that is smoothed over this width and known to this error. `logs` gives the parameters, and
+/// `deviations` about how well each is known.
 pub(super) fn profiles(
-    baseline: &Baseline,
+    told: Told<'_>,
     (p, found): (&[f64], &[f64]),
-    likely: &Known,
-    slid_m_s: Vec<f64>,
     (smoothing_s, slip_error_m_s, form): (f64, f64, Form),
     logs: impl Fn(&[f64]) -> DVector<f64>,
-) -> Option<Profiles> {
-    let n = p.len();
-    let count = baseline.free.iter().filter(|base| Seen::is_curve(base.role)).count();
-    let seen = Seen { baseline, speeds_m_s: speeds(slid_m_s, count)? };
-    let g = seen.derivatives(p);
-    let singular = g.clone().svd(false, false).singular_values;
-    let ratio = singular.min() / singular.max();
-    if ratio.is_nan() || ratio < LOST {
-        return None;
-    }
-    let mut of_seen = &g * &likely.covariance * g.transpose();
+    deviations: &[f64],
+) -> Vec<(f64, f64)> {
+    let Told { seen, to_top, covariance, larger } = told;
+    let baseline = seen.baseline;
     let correction = seen.at(p) - seen.at(found);
+    // An error of the curve's form is one for each of the law's numbers, and is spread over all speeds that are looked at.
+    let numbers_of_curve = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
+    let spread = (seen.speeds_m_s.len() as f64 / numbers_of_curve.max(1) as f64).sqrt();
     let curve = seen.of_slip_error(p, slip_error_m_s).into_iter().map(|of_slip| of_slip.hypot(form.curve));
+    let curve = curve.zip(correction.iter());
+    let of_curve = curve.map(|(form, correction)| spread * form.hypot(CORRECTION_UNKNOWN * correction));
     let numbers = baseline.numbers(p);
     let width = smoothing_s * numbers.stiffness_n_per_m / numbers.damping_n_s_per_m.max(f64::MIN_POSITIVE);
-    let rest = baseline.free.iter().map(|base| base.role).filter(|role| !Seen::is_curve(*role));
-    let left = curve.chain(rest.map(|role| match role {
-        Role::Stiffness => form.stiffness,
-        Role::Damping => (form.damping * width * width).min(1.0),
-        _ => 0.0,
-    }));
-    for (i, left) in left.enumerate() {
-        let form = left.hypot(CORRECTION_UNKNOWN * correction[i]);
-        of_seen[(i, i)] += form * form;
-    }
-    // The prior holds what was found; the likelihood's own top lies beyond.
-    let top = seen.at(p) + &g * &likely.to_top;
-    let posterior = Posterior { seen, top, spread: linear::factor(&of_seen).l(), logs };
-    let best = posterior.best(p, None);
-    let mut precision = {
-        let g = posterior.seen.derivatives(&best);
-        g.transpose() * linear::factor(&of_seen).inverse() * &g
-    };
-    for i in 0..n {
-        precision[(i, i)] += baseline.free[i].parameter.sd.powi(-2);
-    }
-    let to_logs = derivatives(&best, &posterior.logs);
-    let local = &to_logs * linear::factor(&precision).inverse() * to_logs.transpose();
-    let ends = (0..local.nrows()).map(|which| {
-        let deviation = local[(which, which)].sqrt();
-        (posterior.end(&best, which, deviation, -1.0), posterior.end(&best, which, deviation, 1.0))
+    let of_others = seen.other_roles().zip(correction.iter().skip(seen.speeds_m_s.len()));
+    let of_others = of_others.map(|(role, correction)| {
+        let form = match role {
+            Role::Stiffness => {
+                form.stiffness.hypot(KNOWN_WITHIN * numbers.stiffness_n_per_m / numbers.bristles_n_per_m)
+            }
+            Role::Damping => (form.damping * width * width).min(1.0),
+            _ => 0.0,
+        };
+        form.hypot(CORRECTION_UNKNOWN * correction)
     });
-    let ends = ends.collect();
-    Some(Profiles { ends, local })
+    let of_form = DVector::from_vec(of_curve.chain(of_others).map(|sd| sd * sd).collect());
+    // The prior holds what was found; the likelihood's own top lies beyond.
+    let top = seen.at(p) + to_top;
+    let mut posterior = Posterior { seen, top, spread: DMatrix::zeros(0, 0) };
+    let mut ends = Vec::with_capacity(deviations.len());
+    for (which, deviation) in deviations.iter().enumerate() {
+        let larger = larger.as_ref().map_or(1.0, |larger| larger[which]);
+        let of_seen = larger * &covariance + DMatrix::from_diagonal(&of_form);
+        posterior.spread = linear::factor(&of_seen).l();
+        let best = posterior.best(p, None);
+        let of = |p: &[f64]| logs(p)[which];
+        let end = |direction: f64| end(&posterior, &best, &of, *deviation, direction);
+        ends.push((end(-1.0), end(1.0)));
+    }
+    ends
 }
 
 #[cfg(test)]
@@ -255,10 +189,10 @@ mod tests {
         let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
         let slid = || (1..1000).map(|i| 1e-3 * f64::from(i)).collect::<Vec<f64>>();
         // Where the likelihood is quadratic, carried back to the parameters.
+        let count = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
         let straight = |deviation: f64| {
-            let count = baseline.free.iter().filter(|base| Seen::is_curve(base.role)).count();
-            let seen = Seen { baseline: &baseline, speeds_m_s: speeds(slid(), count).unwrap() };
-            let g = seen.derivatives(&p);
+            let seen = Seen { baseline: &baseline, speeds_m_s: speeds(slid(), count, OUTSIDE).unwrap() };
+            let g = derivatives(&p, |p| seen.at(p));
             let of_seen = &g * g.transpose() * (deviation * deviation);
             let mut local = g.transpose() * linear::factor(&of_seen).inverse() * &g;
             (0..p.len()).for_each(|i| local[(i, i)] += baseline.free[i].parameter.sd.powi(-2));
@@ -267,10 +201,10 @@ mod tests {
         let of = |deviation: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
             let logs = |q: &[f64]| DVector::from_vec(values(&model, &baseline, q, &free)).map(f64::ln);
-            let likely = Known { covariance, to_top: DVector::zeros(p.len()) };
-            let known =
-                profiles(&baseline, (&p, &p), &likely, slid(), (0.0, 0.0, Form::BIAS_REMOVED), logs).unwrap();
-            (known.ends[2].0 - p[2], known.ends[2].1 - p[2])
+            let known = Known { covariance, to_top: DVector::zeros(p.len()) };
+            let told = Told::known(&baseline, &p, &known, slid()).unwrap();
+            let ends = profiles(told, (&p, &p), (0.0, 0.0, Form::BIAS_REMOVED), logs, &[deviation; 3]);
+            (ends[2].0 - p[2], ends[2].1 - p[2])
         };
         let (low, high) = of(0.02);
         let half = INTERVAL_95 * straight(0.02);

@@ -15,6 +15,7 @@ pub mod extended_model;
 pub mod filters;
 mod fit_bias;
 pub mod fit_contact;
+mod fit_curve;
 mod fit_interval;
 pub mod fit_parameters;
 mod fit_profile;

@@ -238,6 +238,18 @@ pub struct Slopes {
     gain: Slope,
 }
 
+impl Slopes {
+    /// Those of the baseline.
+    pub fn base(&self) -> &[Slope] {
+        &self.base
+    }
+
+    /// Along ln friction as a whole.
+    pub fn gain(&self) -> &[f64] {
+        &self.gain
+    }
+}
+
 /// What is known of the slopes where a fit begins, taken near by.
 #[derive(Debug, Clone)]
 pub enum Near<'s> {

@@ -1,0 +1,203 @@
+//! The likelihood over ln g at some speeds, in place of the numbers of the law of g.
+//!
+//! Falling and viscous friction make a ridge: many sets of a0, a1, v0 and a2 give nearly the same curve over the speeds that
+//! were slid, and the ridge is narrow and bent, so that a straight step along it leaves it at once. Residuals are nearly linear in
+//! ln g at the slip that is observed, whatever the law's numbers are: so Gauss–Newton is taken there, and the law's numbers are
+//! those that come closest in the likelihood's own metric (minimum distance: L. P. Hansen, *Econometrica* 50, 1982). That search
+//! costs no pass over the logs.
+//! Left out: that another curve is slid at another speed.
+
+use levenberg_marquardt::LevenbergMarquardt;
+use nalgebra::{DMatrix, DVector};
+
+use super::contact::problem::{Baseline, Fit, Near, Problem, Role};
+use super::linear::{self, Slope};
+use crate::least_squares;
+
+/// Speeds at which the curve stands for all of it: three to each of the law's numbers.
+const SPEEDS: usize = 12;
+/// Share of the samples that slid slower than all these speeds, and as many faster.
+const OUTSIDE: f64 = 3e-3;
+/// What is not seen at all is held within so many deviations of the prior, and ln g within so many: so that there is an inverse.
+const HELD_WITHIN: f64 = 10.0;
+/// Step of differences.
+const STEP: f64 = 1e-4;
+/// Parts of the way to the top that are tried: residuals are linear in ln g only so far.
+const PARTS: [f64; 3] = [1.0, 0.3, 0.1];
+
+/// A column for each value.
+pub(super) fn derivatives(p: &[f64], of: impl Fn(&[f64]) -> DVector<f64>) -> DMatrix<f64> {
+    let moved = |i: usize, step: f64| {
+        let mut q = p.to_vec();
+        q[i] += step;
+        of(&q)
+    };
+    let column = |i: usize| (moved(i, STEP) - moved(i, -STEP)) / (2.0 * STEP);
+    DMatrix::from_columns(&(0..p.len()).map(column).collect::<Vec<_>>())
+}
+
+/// Whether a number is one of the curve's.
+pub(super) fn is_of_curve(role: Role) -> bool {
+    matches!(role, Role::A0 | Role::A1 | Role::Static | Role::V0 | Role::Delta | Role::A2 | Role::Factor)
+}
+
+/// Coordinates in which the likelihood is quadratic: ln g at these speeds, then what is no number of the curve.
+pub(super) struct Seen<'a> {
+    pub(super) baseline: &'a Baseline,
+    pub(super) speeds_m_s: Vec<f64>,
+}
+
+impl Seen<'_> {
+    /// The baseline's parameters that are no numbers of the curve.
+    fn others(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.baseline.free.len()).filter(|i| !is_of_curve(self.baseline.free[*i].role))
+    }
+
+    /// Their roles.
+    pub(super) fn other_roles(&self) -> impl Iterator<Item = Role> + '_ {
+        self.others().map(|i| self.baseline.free[i].role)
+    }
+
+    /// Of values of the baseline.
+    pub(super) fn at(&self, p: &[f64]) -> DVector<f64> {
+        let n = self.baseline.numbers(p);
+        let g = |w: f64| n.a0 + n.a1 * (-(w / n.v0_m_s).powf(n.delta)).exp() + n.a2_s_per_m * w;
+        let curve = self.speeds_m_s.iter().map(|w| g(*w).max(f64::MIN_POSITIVE).ln());
+        DVector::from_iterator(self.len(), curve.chain(self.others().map(|i| p[i])))
+    }
+
+    fn len(&self) -> usize {
+        self.speeds_m_s.len() + self.others().count()
+    }
+
+    /// How much ln g changes from a slip of this error, at each of the speeds.
+    pub(super) fn of_slip_error(&self, p: &[f64], error_m_s: f64) -> Vec<f64> {
+        let there = self.at(p);
+        let moved = Seen {
+            baseline: self.baseline,
+            speeds_m_s: self.speeds_m_s.iter().map(|w| w + error_m_s).collect(),
+        };
+        let here = moved.at(p);
+        (0..self.speeds_m_s.len()).map(|i| here[i] - there[i]).collect()
+    }
+
+    /// Deviations within which each coordinate is held where nothing shows it.
+    fn held_within(&self) -> Vec<f64> {
+        let of_others = self.others().map(|i| HELD_WITHIN * self.baseline.free[i].parameter.sd);
+        self.speeds_m_s.iter().map(|_| HELD_WITHIN).chain(of_others).collect()
+    }
+
+    /// Columns of the residuals over the coordinates: those of the curve are the slope along ln friction as a whole, times how
+    /// near in ln speed each sample slides to each of the speeds (linear in between).
+    fn columns(&self, slip_m_s: &[f64], gain: &[f64], base: &[Slope]) -> Vec<Slope> {
+        let at: Vec<f64> = self.speeds_m_s.iter().map(|w| w.ln()).collect();
+        let last = at.len() - 1;
+        let mut of_curve = vec![vec![0.0; gain.len()]; at.len()];
+        for (t, (slip, gain)) in slip_m_s.iter().zip(gain).enumerate() {
+            let w = slip.abs().ln().clamp(at[0], at[last]);
+            let low = at.partition_point(|x| *x <= w).clamp(1, last) - 1;
+            let share = (w - at[low]) / (at[low + 1] - at[low]);
+            of_curve[low][t] = (1.0 - share) * gain;
+            of_curve[low + 1][t] = share * gain;
+        }
+        of_curve.into_iter().map(Slope::from).chain(self.others().map(|i| base[i].clone())).collect()
+    }
+}
+
+/// Speeds that stand for all at which the tip slid, even in ln, without this share of the samples at either end.
+pub(super) fn speeds(mut slid_m_s: Vec<f64>, count: usize, outside: f64) -> Option<Vec<f64>> {
+    slid_m_s.sort_by(f64::total_cmp);
+    let at = |share: f64| slid_m_s.get((share * slid_m_s.len() as f64) as usize).copied();
+    let (low, high) = (at(outside)?, at(1.0 - outside)?);
+    let share = |j: usize| j as f64 / count.saturating_sub(1).max(1) as f64;
+    (low > 0.0 && high > low).then(|| (0..count).map(|j| low * (high / low).powf(share(j))).collect())
+}
+
+/// Sizes of the slip where the tip slides.
+pub(super) fn slid_m_s(problem: &Problem<'_>, p: &[f64]) -> Vec<f64> {
+    let prediction = problem.predict(&[], p);
+    let of_log = prediction.observed.iter().flat_map(|o| o.slip_m_s.iter().zip(&o.sliding));
+    of_log.filter(|(_, sliding)| **sliding > 0.5).map(|(w, _)| w.abs()).filter(|w| *w > 0.0).collect()
+}
+
+/// −ln of likelihood and prior as half a sum of squares.
+pub(super) struct Posterior<'a> {
+    pub(super) seen: Seen<'a>,
+    /// Top of the likelihood.
+    pub(super) top: DVector<f64>,
+    /// Lower triangle of its covariance in what is seen.
+    pub(super) spread: DMatrix<f64>,
+}
+
+impl Posterior<'_> {
+    /// Root of twice −ln, number by number.
+    pub(super) fn residuals(&self, p: &[f64]) -> DVector<f64> {
+        let off = self.seen.at(p) - &self.top;
+        let likely = self.spread.solve_lower_triangular(&off).unwrap_or(off);
+        let free = &self.seen.baseline.free;
+        let prior = free.iter().zip(p).map(|(base, x)| (x - base.parameter.mean) / base.parameter.sd);
+        DVector::from_iterator(likely.len() + p.len(), likely.iter().copied().chain(prior))
+    }
+
+    /// Best from here on, with one more residual where there is one.
+    pub(super) fn best(&self, from: &[f64], held: Option<&dyn Fn(&[f64]) -> f64>) -> Vec<f64> {
+        let residuals = |p: &[f64]| {
+            let r = self.residuals(p);
+            let held = held.map(|held| held(p));
+            let count = r.len() + usize::from(held.is_some());
+            DVector::from_iterator(count, r.iter().copied().chain(held))
+        };
+        let problem = least_squares::Problem {
+            at: DVector::from_column_slice(from),
+            residuals: |p: &DVector<f64>| Some(residuals(p.as_slice())),
+            jacobian: |p: &DVector<f64>| Some(derivatives(p.as_slice(), residuals)),
+        };
+        LevenbergMarquardt::new().minimize(problem).0.at.as_slice().to_vec()
+    }
+}
+
+/// The likelihood about a fit of the baseline, in what is seen.
+pub(super) struct Likelihood<'a> {
+    pub(super) seen: Seen<'a>,
+    /// Where it was fitted.
+    at: DVector<f64>,
+    /// From there to the top.
+    pub(super) to_top: DVector<f64>,
+    /// Covariance, the samples taken for independent ones.
+    pub(super) covariance: DMatrix<f64>,
+}
+
+impl<'a> Likelihood<'a> {
+    /// About a fit. `None` where it slides at one speed, or where no curve is free.
+    pub(super) fn about(problem: &'a Problem<'_>, fit: &Fit) -> Option<Self> {
+        let baseline = problem.baseline;
+        let of_curve = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
+        let speeds_m_s = speeds(slid_m_s(problem, &fit.p), SPEEDS, OUTSIDE).filter(|_| of_curve > 1)?;
+        let seen = Seen { baseline, speeds_m_s };
+        let slopes = problem.slopes_of(fit);
+        let slip = problem.predict(&[], &fit.p).observed.into_iter().flat_map(|o| o.slip_m_s);
+        let columns = seen.columns(&slip.collect::<Vec<_>>(), slopes.gain(), slopes.base());
+        let (mut h, g) = problem.normal_equations(&columns, &fit.r);
+        seen.held_within().iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
+        let factor = linear::factor(&h);
+        Some(Self { at: seen.at(&fit.p), to_top: factor.solve(&g), covariance: factor.inverse(), seen })
+    }
+}
+
+/// Goes from a fit of the baseline to the top that the likelihood has over ln g, or a part of the way; the fit itself where that
+/// gains nothing.
+pub(super) fn along_curve(problem: &Problem<'_>, fit: Fit) -> Fit {
+    let Some(Likelihood { seen, at, to_top, covariance }) = Likelihood::about(problem, &fit) else {
+        return fit;
+    };
+    let mut posterior = Posterior { seen, top: at.clone(), spread: linear::factor(&covariance).l() };
+    for part in PARTS {
+        posterior.top = &at + part * &to_top;
+        let next = posterior.best(&fit.p, None);
+        let next = problem.fit(&[], next, 0, Near::Nothing);
+        if next.cost < fit.cost {
+            return next;
+        }
+    }
+    fit
+}
