@@ -3,19 +3,20 @@
 //! The observer knows force and load only at the samples: it interpolates what rings between them, sees a slip that begins or
 //! ends within one late, and smooths what it differentiates. Each of these moves the numbers that fit best, by the same in
 //! every log of the kind. So the fitted contact is simulated with the logs' own motion and load, noise is put on all channels,
-//! and the same likelihood is asked which numbers it would take: p̂ = p + b(p), solved for p by Broyden's method (indirect
-//! inference, Gouriéroux, Monfort and Renault 1993). No instant of slip has to be that of the rig. b is the mean over noise
+//! and the same likelihood is asked where its top is: at φ + b(φ), with φ = ln g at some speeds and what is no number of the curve
+//! ([`super::fit_curve`]), where b changes little along the ridge that the law's numbers make. The numbers are those that come
+//! closest, with the prior, to the measured logs' top less b, b being taken where they are (indirect inference, Gouriéroux, Monfort
+//! and Renault 1993). No instant of slip has to be that of the rig. b is the mean over noise
 //! and the same noise with the other sign, so that what it does in first order cancels and what it biases stays.
 //! Left out: what differs between the rig and the model.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::contact::log::ContactLog;
 use super::contact::problem::{Baseline, Fit, Near, Numbers, Problem};
-use super::fit_curve::along_curve;
+use super::fit_curve::{Likelihood, Seen, along_curve};
 use super::fit_parameters::{set_all, values};
-use super::linear::factor;
 use super::noise::{White, standard_deviation};
 use crate::files::log::Log;
 use crate::files::model_file::ModelFile;
@@ -29,7 +30,7 @@ use crate::predict::{BridgeModel, ContactInputs, integral, simulate_friction};
 const ROUNDS: usize = 6;
 /// Gauss–Newton steps in a simulated log, from the numbers it was simulated with.
 const STEPS: usize = 12;
-/// The search ends where the optimum is as close to the one that was found as this share of what white noise leaves open.
+/// The search ends where the bias that is taken off is the one that is there but for this share of what white noise leaves open.
 const CONVERGED: f64 = 0.05;
 
 /// What was fitted, and to what.
@@ -45,12 +46,6 @@ pub(super) struct Resimulated<'a> {
 type Quiet = Vec<(Signal, Vec<f64>, f64)>;
 
 impl Resimulated<'_> {
-    /// Of the priors.
-    fn precision(&self) -> DVector<f64> {
-        let free = &self.baseline.free;
-        DVector::from_iterator(free.len(), free.iter().map(|base| base.parameter.sd.powi(-2)))
-    }
-
     fn quiet(&self, p: &[f64], raw: &Log, log: &ContactLog) -> Result<Quiet, InputError> {
         let mut model = self.model.clone();
         model.extensions.clear();
@@ -93,17 +88,12 @@ impl Resimulated<'_> {
         Ok(bridges.into_iter().chain(motion.into_iter().flatten()).collect())
     }
 
-    /// How far from `p` the optimum is in logs with these numbers, had the prior its mean there: shrinkage towards the mean that it
-    /// has moves what was found in the measured logs by as much, and is no bias of the observer's.
-    fn bias(&self, measured: &Problem<'_>, p: &[f64]) -> Result<DVector<f64>, InputError> {
+    /// How far from `p` the likelihood's top is in logs with these numbers, in what is seen.
+    fn bias(&self, measured: &Problem<'_>, seen: &Seen<'_>, p: &[f64]) -> Result<DVector<f64>, InputError> {
         let pairs: Vec<(&Log, &ContactLog)> = self.raw.iter().zip(measured.logs).collect();
         let quiet: Vec<Quiet> =
             pairs.par_iter().map(|(raw, log)| self.quiet(p, raw, log)).collect::<Result<_, InputError>>()?;
-        let priors = || self.baseline.free.iter().map(|base| &base.parameter);
-        let precision = self.precision();
-        let pull = DVector::from_iterator(p.len(), p.iter().zip(priors()).map(|(x, prior)| x - prior.mean))
-            .component_mul(&precision);
-        let optimum = |sign: f64| -> Result<DVector<f64>, InputError> {
+        let top = |sign: f64| -> Result<DVector<f64>, InputError> {
             let mut white = White::new(1);
             let mut logs = Vec::new();
             for ((raw, _), quiet) in pairs.iter().zip(&quiet) {
@@ -118,15 +108,13 @@ impl Resimulated<'_> {
             let noise = problem.noise_at(&[], p).fitted_as(&logs, &measured.noise);
             let problem = Problem::with_noise(&logs, self.baseline, &[], noise);
             let fit = along_curve(&problem, problem.fit(&[], p.to_vec(), STEPS, Near::Nothing));
-            let (h, _) = problem.normal_equations(&problem.jacobian_of(&fit), &fit.r);
-            let shrunk = factor(&(h + DMatrix::from_diagonal(&precision))).solve(&pull);
-            Ok(DVector::from_vec(fit.p) + shrunk)
+            Ok(Likelihood::seen(seen.clone(), &problem, &fit).top())
         };
-        let (plus, minus) = rayon::join(|| optimum(1.0), || optimum(-1.0));
-        Ok(0.5 * (plus? + minus?) - DVector::from_column_slice(p))
+        let (plus, minus) = rayon::join(|| top(1.0), || top(-1.0));
+        Ok(0.5 * (plus? + minus?) - seen.at(p))
     }
 
-    /// The numbers in whose logs the likelihood's optimum would be at the one that was found.
+    /// The numbers in whose logs the likelihood's top would be at the one that was found, as far as the prior lets them.
     ///
     /// # Errors
     /// Logs without the columns; a model that does not take the numbers.
@@ -136,37 +124,27 @@ impl Resimulated<'_> {
         found: &Fit,
         progress: &(dyn Fn() + Sync),
     ) -> Result<Vec<f64>, InputError> {
-        let at_found = DVector::from_column_slice(&found.p);
-        let columns = problem.jacobian(&[], &found.p, &found.r);
-        let (h, _) = problem.normal_equations(&columns, &found.r);
-        let with_prior = factor(&(h + DMatrix::from_diagonal(&self.precision())));
-        let open = with_prior.inverse().diagonal().map(f64::sqrt);
-        let converged = |missed_by: &DVector<f64>| missed_by.component_div(&open).amax() < CONVERGED;
-        let mut p = at_found.clone();
-        let missed = |p: &DVector<f64>| -> Result<DVector<f64>, InputError> {
-            progress();
-            Ok(p + self.bias(problem, p.as_slice())? - &at_found)
-        };
-        let mut missed_by = missed(&p)?;
-        let mut best = (missed_by.norm(), p.clone());
-        let mut inverse = DMatrix::identity(p.len(), p.len());
+        let likelihood = Likelihood::about(problem, found);
+        let open = likelihood.covariance.diagonal().map(f64::sqrt);
+        let mut posterior = likelihood.posterior();
+        progress();
+        let mut taken = self.bias(problem, &likelihood.seen, &found.p)?;
+        let mut best = (f64::INFINITY, found.p.clone());
         for _ in 1..ROUNDS {
-            if converged(&missed_by) {
+            progress();
+            posterior.top = likelihood.top() - &taken;
+            let p = posterior.best(&best.1, None);
+            let there = self.bias(problem, &likelihood.seen, &p)?;
+            let off = (&there - &taken).component_div(&open).amax();
+            if off < best.0 {
+                best = (off, p);
+            }
+            if off < CONVERGED {
                 break;
             }
-            let step = -(&inverse * &missed_by);
-            p += &step;
-            let before = std::mem::replace(&mut missed_by, missed(&p)?);
-            if missed_by.norm() < best.0 {
-                best = (missed_by.norm(), p.clone());
-            }
-            let change = &inverse * (&missed_by - before);
-            let along = step.dot(&change);
-            if along == 0.0 {
-                break;
-            }
-            inverse += (&step - &change) * (step.transpose() * &inverse) / along;
+            // Half of the way: what grows with the number itself, as the damping's does, would swing to and fro.
+            taken = 0.5 * (taken + there);
         }
-        Ok(best.1.as_slice().to_vec())
+        Ok(best.1)
     }
 }

@@ -15,7 +15,7 @@ use super::contact::problem::{Baseline, DRIFT, Fit, Near, Problem, Role};
 use super::contact::smoothing::OBSERVED_OVER;
 use super::filters::rms;
 use super::fit_bias::Resimulated;
-use super::fit_curve::{Likelihood, along_curve, slid_m_s};
+use super::fit_curve::{Likelihood, along_curve, is_of_curve, slid_m_s};
 use super::fit_interval::Linearised;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_profile::{Form, Told, profiles};
@@ -242,10 +242,14 @@ pub fn identify(
     let known_to = (smoothing_s, DRIFT * usual_m_s, form);
     let logs_of = |p: &[f64]| DVector::from_vec(values(model, &baseline, p, free)).map(f64::ln);
     let to_log = log_derivatives(model, &baseline, &fit.p, free);
+    let of_curve = |name: &String| {
+        baseline.free.iter().any(|base| base.parameter.name == *name && is_of_curve(base.role))
+    };
+    let curve: Vec<usize> = (0..free.len()).filter(|i| of_curve(&free[*i])).collect();
     let told = if by_simulation {
         Told::known(&baseline, &fit.p, &likely, slid_m_s(&problem, &fit.p))
     } else {
-        observed.map(|likelihood| Told::observed(likelihood, &likely.covariance, &pretended, &to_log))
+        Some(Told::observed(observed, [&likely.covariance, &pretended], &to_log, &curve))
     };
     let about = Uncertain::about(
         &values(model, &baseline, &fit.p, free),

@@ -41,7 +41,9 @@ pub(super) fn is_of_curve(role: Role) -> bool {
     matches!(role, Role::A0 | Role::A1 | Role::Static | Role::V0 | Role::Delta | Role::A2 | Role::Factor)
 }
 
-/// Coordinates in which the likelihood is quadratic: ln g at these speeds, then what is no number of the curve.
+/// Coordinates in which the likelihood is quadratic: ln g at these speeds, then what is no number of the curve; all values of the
+/// baseline where there are no speeds.
+#[derive(Clone)]
 pub(super) struct Seen<'a> {
     pub(super) baseline: &'a Baseline,
     pub(super) speeds_m_s: Vec<f64>,
@@ -50,7 +52,8 @@ pub(super) struct Seen<'a> {
 impl Seen<'_> {
     /// The baseline's parameters that are no numbers of the curve.
     fn others(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.baseline.free.len()).filter(|i| !is_of_curve(self.baseline.free[*i].role))
+        let free = self.baseline.free.iter().enumerate();
+        free.filter(|(_, base)| self.speeds_m_s.is_empty() || !is_of_curve(base.role)).map(|(i, _)| i)
     }
 
     /// Their roles.
@@ -91,14 +94,15 @@ impl Seen<'_> {
     /// near in ln speed each sample slides to each of the speeds (linear in between).
     fn columns(&self, slip_m_s: &[f64], gain: &[f64], base: &[Slope]) -> Vec<Slope> {
         let at: Vec<f64> = self.speeds_m_s.iter().map(|w| w.ln()).collect();
-        let last = at.len() - 1;
         let mut of_curve = vec![vec![0.0; gain.len()]; at.len()];
-        for (t, (slip, gain)) in slip_m_s.iter().zip(gain).enumerate() {
-            let w = slip.abs().ln().clamp(at[0], at[last]);
-            let low = at.partition_point(|x| *x <= w).clamp(1, last) - 1;
-            let share = (w - at[low]) / (at[low + 1] - at[low]);
-            of_curve[low][t] = (1.0 - share) * gain;
-            of_curve[low + 1][t] = share * gain;
+        if let [first, .., last] = at[..] {
+            for (t, (slip, gain)) in slip_m_s.iter().zip(gain).enumerate() {
+                let w = slip.abs().ln().clamp(first, last);
+                let low = at.partition_point(|x| *x <= w).clamp(1, at.len() - 1) - 1;
+                let share = (w - at[low]) / (at[low + 1] - at[low]);
+                of_curve[low][t] = (1.0 - share) * gain;
+                of_curve[low + 1][t] = share * gain;
+            }
         }
         of_curve.into_iter().map(Slope::from).chain(self.others().map(|i| base[i].clone())).collect()
     }
@@ -120,6 +124,9 @@ pub(super) fn slid_m_s(problem: &Problem<'_>, p: &[f64]) -> Vec<f64> {
     of_log.filter(|(_, sliding)| **sliding > 0.5).map(|(w, _)| w.abs()).filter(|w| *w > 0.0).collect()
 }
 
+/// One more residual.
+pub(super) type Held<'a> = &'a dyn Fn(&[f64]) -> f64;
+
 /// −ln of likelihood and prior as half a sum of squares.
 pub(super) struct Posterior<'a> {
     pub(super) seen: Seen<'a>,
@@ -140,7 +147,7 @@ impl Posterior<'_> {
     }
 
     /// Best from here on, with one more residual where there is one.
-    pub(super) fn best(&self, from: &[f64], held: Option<&dyn Fn(&[f64]) -> f64>) -> Vec<f64> {
+    pub(super) fn best(&self, from: &[f64], held: Option<Held<'_>>) -> Vec<f64> {
         let residuals = |p: &[f64]| {
             let r = self.residuals(p);
             let held = held.map(|held| held(p));
@@ -168,33 +175,45 @@ pub(super) struct Likelihood<'a> {
 }
 
 impl<'a> Likelihood<'a> {
-    /// About a fit. `None` where it slides at one speed, or where no curve is free.
-    pub(super) fn about(problem: &'a Problem<'_>, fit: &Fit) -> Option<Self> {
-        let baseline = problem.baseline;
-        let of_curve = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
-        let speeds_m_s = speeds(slid_m_s(problem, &fit.p), SPEEDS, OUTSIDE).filter(|_| of_curve > 1)?;
-        let seen = Seen { baseline, speeds_m_s };
+    /// About a fit of the baseline.
+    pub(super) fn about(problem: &Problem<'a>, fit: &Fit) -> Self {
+        let of_curve = problem.baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
+        // Where it slides at one speed, or one number of the curve is free, there is no ridge.
+        let slid = (of_curve > 1).then(|| speeds(slid_m_s(problem, &fit.p), SPEEDS, OUTSIDE)).flatten();
+        Self::seen(Seen { baseline: problem.baseline, speeds_m_s: slid.unwrap_or_default() }, problem, fit)
+    }
+
+    /// The same in these coordinates.
+    pub(super) fn seen(seen: Seen<'a>, problem: &Problem<'a>, fit: &Fit) -> Self {
         let slopes = problem.slopes_of(fit);
         let slip = problem.predict(&[], &fit.p).observed.into_iter().flat_map(|o| o.slip_m_s);
         let columns = seen.columns(&slip.collect::<Vec<_>>(), slopes.gain(), slopes.base());
         let (mut h, g) = problem.normal_equations(&columns, &fit.r);
         seen.held_within().iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
         let factor = linear::factor(&h);
-        Some(Self { at: seen.at(&fit.p), to_top: factor.solve(&g), covariance: factor.inverse(), seen })
+        Self { at: seen.at(&fit.p), to_top: factor.solve(&g), covariance: factor.inverse(), seen }
+    }
+
+    /// Its top.
+    pub(super) fn top(&self) -> DVector<f64> {
+        &self.at + &self.to_top
+    }
+
+    /// With the prior.
+    pub(super) fn posterior(&self) -> Posterior<'a> {
+        let spread = linear::factor(&self.covariance).l();
+        Posterior { seen: self.seen.clone(), top: self.top(), spread }
     }
 }
 
 /// Goes from a fit of the baseline to the top that the likelihood has over ln g, or a part of the way; the fit itself where that
 /// gains nothing.
 pub(super) fn along_curve(problem: &Problem<'_>, fit: Fit) -> Fit {
-    let Some(Likelihood { seen, at, to_top, covariance }) = Likelihood::about(problem, &fit) else {
-        return fit;
-    };
-    let mut posterior = Posterior { seen, top: at.clone(), spread: linear::factor(&covariance).l() };
+    let likelihood = Likelihood::about(problem, &fit);
+    let mut posterior = likelihood.posterior();
     for part in PARTS {
-        posterior.top = &at + part * &to_top;
-        let next = posterior.best(&fit.p, None);
-        let next = problem.fit(&[], next, 0, Near::Nothing);
+        posterior.top = &likelihood.at + part * &likelihood.to_top;
+        let next = problem.fit(&[], posterior.best(&fit.p, None), 0, Near::Nothing);
         if next.cost < fit.cost {
             return next;
         }

@@ -94,15 +94,18 @@ pub(super) struct Told<'a> {
 
 impl<'a> Told<'a> {
     /// Of a likelihood whose samples are taken for independent ones; `likely` is what is known of the values when they are not, and
-    /// `pretended` their covariance when they are.
+    /// `pretended` their covariance when they are. `curve` are the places of the curve's numbers among the file's parameters: a ridge
+    /// that is bent has another of them as its direction elsewhere, so they share the largest.
     pub(super) fn observed(
         likelihood: Likelihood<'a>,
-        likely: &DMatrix<f64>,
-        pretended: &DMatrix<f64>,
+        [likely, pretended]: [&DMatrix<f64>; 2],
         to_logs: &DMatrix<f64>,
+        curve: &[usize],
     ) -> Self {
         let of_logs = |covariance: &DMatrix<f64>| (to_logs * covariance * to_logs.transpose()).diagonal();
-        let larger = of_logs(likely).component_div(&of_logs(pretended)).as_slice().to_vec();
+        let mut larger = of_logs(likely).component_div(&of_logs(pretended)).as_slice().to_vec();
+        let largest = curve.iter().map(|i| larger[*i]).fold(0.0, f64::max);
+        curve.iter().for_each(|i| larger[*i] = largest);
         let Likelihood { seen, to_top, covariance, .. } = likelihood;
         Self { seen, to_top, covariance, larger: Some(larger) }
     }
