@@ -220,3 +220,103 @@ pub(super) fn along_curve(problem: &Problem<'_>, fit: Fit) -> Fit {
     }
     fit
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::log::Log;
+    use crate::files::model_file::{ModelFile, ModelKind};
+    use crate::files::rig_file::RigFile;
+    use crate::files::signal::Signal;
+    use crate::identify::contact::log::ContactLog;
+    use crate::identify::fit_parameters::baseline_of;
+    use crate::identify::noise::White;
+    use crate::predict::{ContactInputs, simulate_friction};
+
+    /// Speeds of falling and of viscous friction, so that the numbers make a ridge.
+    const NUMBERS: [(&str, f64); 5] =
+        [("sigma0_n_per_m", 3e4), ("a0", 0.5), ("a1", 0.5), ("v0_m_s", 0.4), ("a2_s_per_m", 0.04)];
+
+    fn model(numbers: &[(&str, f64)]) -> ModelFile {
+        ModelFile::new("model", ModelKind::Lugre, numbers).unwrap()
+    }
+
+    /// Reversals at several speeds and loads, with noise on the friction torque.
+    fn log(rig: &RigFile, noise_nm: f64) -> Log {
+        let time: Vec<f64> = (0..8000).map(|i| 1e-3 * f64::from(i)).collect();
+        let speed = |t: &f64| 8.0 * (1.3 * t).sin() + 4.0 * (3.1 * t).sin();
+        let mut log = Log::default();
+        log.set_signal(Signal::M2Speed, time.iter().map(speed).collect());
+        log.set_signal(Signal::NormalForce, time.iter().map(|t| 70.0 + 25.0 * (0.7 * t).sin()).collect());
+        log.set_signal(Signal::FrictionTorque, vec![0.0; time.len()]);
+        log.set_signal(Signal::Time, time);
+        let inputs = ContactInputs::new(&log.contact().unwrap(), rig);
+        let torque_nm = simulate_friction(&model(&NUMBERS), rig, &inputs).unwrap();
+        let mut white = White::new(3);
+        let shown = torque_nm.iter().map(|t| t + noise_nm * white.next()).collect();
+        log.set_signal(Signal::FrictionTorque, shown);
+        log
+    }
+
+    fn free() -> Vec<String> {
+        ["a0", "a1", "v0_m_s", "a2_s_per_m", "sigma0_n_per_m"].map(String::from).to_vec()
+    }
+
+    #[test]
+    fn slopes_over_the_curve_make_those_over_the_laws_numbers() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
+        let baseline = baseline_of(&model(&NUMBERS), &rig, &free()).unwrap();
+        let problem = Problem::new(&logs, &baseline, &[]);
+        let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+        let fit = problem.fit(&[], p.clone(), 0, Near::Nothing);
+        let seen = Likelihood::about(&problem, &fit).seen;
+        assert_eq!(seen.speeds_m_s.len(), SPEEDS);
+        let slopes = problem.slopes_of(&fit);
+        let slip: Vec<f64> = problem.predict(&[], &p).observed.into_iter().flat_map(|o| o.slip_m_s).collect();
+        let columns = seen.columns(&slip, slopes.gain(), slopes.base());
+        let to_seen = derivatives(&p, |p| seen.at(p));
+        for i in 0..4 {
+            let own = &slopes.base()[i];
+            let made =
+                |t: usize| columns.iter().enumerate().map(|(k, c)| c[t] * to_seen[(k, i)]).sum::<f64>();
+            let off: f64 = own.iter().enumerate().map(|(t, own)| (own - made(t)).powi(2)).sum();
+            let size: f64 = own.iter().map(|own| own * own).sum();
+            assert!(off < 0.01 * size, "{i}: {off} of {size}");
+        }
+    }
+
+    #[test]
+    fn a_bent_ridge_is_followed_to_its_lowest_point_from_either_end() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
+        let baseline = baseline_of(&model(&NUMBERS), &rig, &free()).unwrap();
+        let problem = Problem::new(&logs, &baseline, &[]);
+        // About the same curve over what is slid, with v0 at half and at twice of what it is.
+        let ends = [[1.2, 0.8, 0.5, 0.7], [0.7, 1.3, 2.0, 1.4]].map(|factors: [f64; 4]| {
+            let mut p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+            p.iter_mut().zip(factors).for_each(|(p, factor)| *p += factor.ln());
+            problem.fit(&[], p, 0, Near::Nothing)
+        });
+        let apart = |follow: &dyn Fn(Fit) -> Fit| {
+            let [a, b] = ends.clone().map(|end| (0..4).fold(end, |fit, _| follow(fit)).cost);
+            (a - b).abs()
+        };
+        let straight = apart(&|fit| problem.fit(&[], fit.p, 4, Near::Nothing));
+        let bent = apart(&|fit| along_curve(&problem, fit));
+        // One standard deviation costs a half.
+        assert!(bent < 0.5 && straight > 4.0 * bent, "{bent} {straight}");
+    }
+
+    #[test]
+    fn a_curve_that_is_not_asked_for_leaves_the_values_themselves() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
+        let baseline = baseline_of(&model(&NUMBERS), &rig, &["a0".to_string()]).unwrap();
+        let problem = Problem::new(&logs, &baseline, &[]);
+        let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
+        let fit = problem.fit(&[], p, 4, Near::Nothing);
+        let seen = Likelihood::about(&problem, &fit).seen;
+        assert_eq!(seen.at(&fit.p).as_slice(), fit.p);
+    }
+}
