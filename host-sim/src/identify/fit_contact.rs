@@ -2,7 +2,8 @@
 //!
 //! The friction law is evaluated at the slip that is observed from the measured force
 //! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
-//! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it;
+//! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it, straight
+//! and along the friction curve, whose numbers make a bent ridge ([`super::fit_curve`]);
 //! then the noise's sources are fitted to what is left, and the parameters again. What the observer is biased by in logs of
 //! this kind, known numbers simulated, is taken off (`fit_bias`). Where a simulation of these logs leaves less than the observed
 //! slip, it decides in place of that (`fit_simulated`).
@@ -415,7 +416,7 @@ mod tests {
     /// Over ten pairs of logs, since one interval of twenty does not hold the truth: errors in units of what is stated are on
     /// average none, and about one.
     #[test]
-    #[ignore = "the interval of c_u is 1.8 times too narrow in such logs: mean square 3.2, mean 0.4; the others hold"]
+    #[ignore = "c_u is off by up to 7 % in such logs, with the channel's lateness off by 0.4 ms: mean square 6.2, mean 0.1; the others hold"]
     fn a_series_element_is_found_from_a_start_that_is_off_by_a_third() {
         const PAIRS: u64 = 10;
         /// Chi-squared of ten degrees of freedom is beyond 29.6 once in a thousand, a normal deviate beyond 3.3.
