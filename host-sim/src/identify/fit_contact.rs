@@ -3,7 +3,7 @@
 //! The friction law is evaluated at the slip that is observed from the measured force
 //! ([`super::contact::observer`]), so that no simulation has to slip at the same instants as the rig did, and the error
 //! surface has one valley where a simulation has many. Gauss–Newton from the model file and from a few starts around it, straight
-//! and along the friction curve, whose numbers make a bent ridge ([`super::fit_curve`]);
+//! and along the friction curve, whose numbers make a bent ridge (`fit_curve`);
 //! then the noise's sources are fitted to what is left, and the parameters again. What the observer is biased by in logs of
 //! this kind, known numbers simulated, is taken off (`fit_bias`). Where a simulation of these logs leaves less than the observed
 //! slip, it decides in place of that (`fit_simulated`).
