@@ -6,15 +6,15 @@
 //! and the same likelihood is asked where its top is: at φ + b(φ), with φ = ln g at some speeds and what is no number of the curve
 //! ([`super::fit_curve`]), where b changes little along the ridge that the law's numbers make. The numbers are those that come
 //! closest, with the prior, to the measured logs' top less b, b being taken where they are (indirect inference, Gouriéroux, Monfort
-//! and Renault 1993). No instant of slip has to be that of the rig. b is the mean over noise
-//! and the same noise with the other sign, so that what it does in first order cancels and what it biases stays.
+//! and Renault 1993). No instant of slip has to be that of the rig. b is the mean over noise and the same noise with the other sign,
+//! so that what it does in first order cancels and what it biases stays.
 //! Left out: what differs between the rig and the model.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::contact::log::ContactLog;
-use super::contact::problem::{Baseline, Fit, Near, Numbers, Problem};
+use super::contact::problem::{Baseline, Near, Numbers, Problem};
 use super::fit_curve::{Likelihood, Seen, along_curve};
 use super::fit_parameters::{set_all, values};
 use super::noise::{White, standard_deviation};
@@ -121,15 +121,14 @@ impl Resimulated<'_> {
     pub(super) fn unbiased(
         &self,
         problem: &Problem<'_>,
-        found: &Fit,
+        (found, likelihood): (&[f64], &Likelihood<'_>),
         progress: &(dyn Fn() + Sync),
     ) -> Result<Vec<f64>, InputError> {
-        let likelihood = Likelihood::about(problem, found);
         let open = likelihood.covariance.diagonal().map(f64::sqrt);
         let mut posterior = likelihood.posterior();
         progress();
-        let mut taken = self.bias(problem, &likelihood.seen, &found.p)?;
-        let mut best = (f64::INFINITY, found.p.clone());
+        let mut taken = self.bias(problem, &likelihood.seen, found)?;
+        let mut best = (f64::INFINITY, found.to_vec());
         for _ in 1..ROUNDS {
             progress();
             posterior.top = likelihood.top() - &taken;

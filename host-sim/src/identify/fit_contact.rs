@@ -221,21 +221,23 @@ pub fn identify(
         alone.iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
         (linearised.known(&alone), linearised.known(&prior_sd).covariance, linear::factor(&h).inverse())
     };
-    let observed = Likelihood::about(&problem, &fit);
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);
     let left = smoothed_rms(&left.collect::<Vec<_>>(), logs[0].grid.step_s);
     let simulated = Simulated::new(model, rig, &baseline, free, raw, (&found, left))?.fit(&found, progress);
     let simulated = simulated.and_then(|fit| Some((fit.known()?, fit.p)));
     let by_simulation = simulated.is_some();
-    if let Some((known, p)) = simulated {
+    let observed = if let Some((known, p)) = simulated {
         (fit.p, found) = (p.clone(), p);
         under_prior = known.covariance.clone();
         likely = known;
+        None
     } else {
+        let likelihood = Likelihood::about(&problem, &fit);
         let resimulated = Resimulated { model, rig, baseline: &baseline, free, raw };
-        fit.p = resimulated.unbiased(&problem, &fit, progress)?;
-    }
+        fit.p = resimulated.unbiased(&problem, (&found, &likelihood), progress)?;
+        Some(likelihood)
+    };
     let prediction = problem.predict(&[], &fit.p);
     let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
     let smoothing_s = logs.iter().map(|log| OBSERVED_OVER * log.grid.step_s).fold(0.0, f64::max);
@@ -247,17 +249,15 @@ pub fn identify(
         baseline.free.iter().any(|base| base.parameter.name == *name && is_of_curve(base.role))
     };
     let curve: Vec<usize> = (0..free.len()).filter(|i| of_curve(&free[*i])).collect();
-    let told = if by_simulation {
-        Told::known(&baseline, &fit.p, &likely, slid_m_s(&problem, &fit.p))
-    } else {
-        Some(Told::observed(observed, [&likely.covariance, &pretended], &to_log, &curve))
+    let told = match observed {
+        None => Told::known(&baseline, &fit.p, &likely, slid_m_s(&prediction)),
+        Some(likelihood) => {
+            Some(Told::observed(likelihood, [&likely.covariance, &pretended], &to_log, &curve))
+        }
     };
-    let about = Uncertain::about(
-        &values(model, &baseline, &fit.p, free),
-        &(&to_log * under_prior * to_log.transpose()),
-    );
     let before = values(model, &baseline, &found, free);
     let values = values(model, &baseline, &fit.p, free);
+    let about = Uncertain::about(&values, &(&to_log * under_prior * to_log.transpose()));
     let bias = before.iter().zip(&values).map(|(before, value)| before / value - 1.0).collect();
     let uncertain = match told {
         Some(told) => {

@@ -10,7 +10,7 @@
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
 
-use super::contact::problem::{Baseline, Fit, Near, Problem, Role};
+use super::contact::problem::{Baseline, Fit, Near, Prediction, Problem, Role};
 use super::linear::{self, Slope};
 use crate::least_squares;
 
@@ -36,9 +36,14 @@ pub(super) fn derivatives(p: &[f64], of: impl Fn(&[f64]) -> DVector<f64>) -> DMa
     DMatrix::from_columns(&(0..p.len()).map(column).collect::<Vec<_>>())
 }
 
-/// Whether a number is one of the curve's.
+/// Whether a number is one of the curve's. Static friction of its own is not: what breaks away shows it, and no speed that is slid.
 pub(super) fn is_of_curve(role: Role) -> bool {
-    matches!(role, Role::A0 | Role::A1 | Role::Static | Role::V0 | Role::Delta | Role::A2 | Role::Factor)
+    matches!(role, Role::A0 | Role::A1 | Role::V0 | Role::Delta | Role::A2 | Role::Factor)
+}
+
+/// How many of what is free are.
+pub(super) fn numbers_of_curve(baseline: &Baseline) -> usize {
+    baseline.free.iter().filter(|base| is_of_curve(base.role)).count()
 }
 
 /// Coordinates in which the likelihood is quadratic: ln g at these speeds, then what is no number of the curve; all values of the
@@ -118,14 +123,13 @@ pub(super) fn speeds(mut slid_m_s: Vec<f64>, count: usize, outside: f64) -> Opti
 }
 
 /// Sizes of the slip where the tip slides.
-pub(super) fn slid_m_s(problem: &Problem<'_>, p: &[f64]) -> Vec<f64> {
-    let prediction = problem.predict(&[], p);
+pub(super) fn slid_m_s(prediction: &Prediction) -> Vec<f64> {
     let of_log = prediction.observed.iter().flat_map(|o| o.slip_m_s.iter().zip(&o.sliding));
     of_log.filter(|(_, sliding)| **sliding > 0.5).map(|(w, _)| w.abs()).filter(|w| *w > 0.0).collect()
 }
 
-/// One more residual.
-pub(super) type Held<'a> = &'a dyn Fn(&[f64]) -> f64;
+/// A number that values of the baseline give.
+pub(super) type Number<'a> = &'a dyn Fn(&[f64]) -> f64;
 
 /// −ln of likelihood and prior as half a sum of squares.
 pub(super) struct Posterior<'a> {
@@ -147,7 +151,7 @@ impl Posterior<'_> {
     }
 
     /// Best from here on, with one more residual where there is one.
-    pub(super) fn best(&self, from: &[f64], held: Option<Held<'_>>) -> Vec<f64> {
+    pub(super) fn best(&self, from: &[f64], held: Option<Number<'_>>) -> Vec<f64> {
         let residuals = |p: &[f64]| {
             let r = self.residuals(p);
             let held = held.map(|held| held(p));
@@ -177,16 +181,22 @@ pub(super) struct Likelihood<'a> {
 impl<'a> Likelihood<'a> {
     /// About a fit of the baseline.
     pub(super) fn about(problem: &Problem<'a>, fit: &Fit) -> Self {
-        let of_curve = problem.baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
+        let baseline = problem.baseline;
+        let prediction = problem.predict(&[], &fit.p);
         // Where it slides at one speed, or one number of the curve is free, there is no ridge.
-        let slid = (of_curve > 1).then(|| speeds(slid_m_s(problem, &fit.p), SPEEDS, OUTSIDE)).flatten();
-        Self::seen(Seen { baseline: problem.baseline, speeds_m_s: slid.unwrap_or_default() }, problem, fit)
+        let ridge = numbers_of_curve(baseline) > 1;
+        let slid = ridge.then(|| speeds(slid_m_s(&prediction), SPEEDS, OUTSIDE)).flatten();
+        Self::of(Seen { baseline, speeds_m_s: slid.unwrap_or_default() }, problem, fit, prediction)
     }
 
     /// The same in these coordinates.
     pub(super) fn seen(seen: Seen<'a>, problem: &Problem<'a>, fit: &Fit) -> Self {
+        Self::of(seen, problem, fit, problem.predict(&[], &fit.p))
+    }
+
+    fn of(seen: Seen<'a>, problem: &Problem<'a>, fit: &Fit, prediction: Prediction) -> Self {
         let slopes = problem.slopes_of(fit);
-        let slip = problem.predict(&[], &fit.p).observed.into_iter().flat_map(|o| o.slip_m_s);
+        let slip = prediction.observed.into_iter().flat_map(|o| o.slip_m_s);
         let columns = seen.columns(&slip.collect::<Vec<_>>(), slopes.gain(), slopes.base());
         let (mut h, g) = problem.normal_equations(&columns, &fit.r);
         seen.held_within().iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
@@ -258,65 +268,80 @@ mod tests {
         log
     }
 
-    fn free() -> Vec<String> {
-        ["a0", "a1", "v0_m_s", "a2_s_per_m", "sigma0_n_per_m"].map(String::from).to_vec()
+    /// With what is free of a model, in a log with noise: the problem, and the values of the file.
+    fn with_free<T>(model: &ModelFile, free: &[&str], check: impl FnOnce(&Problem<'_>, Vec<f64>) -> T) -> T {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
+        let free: Vec<String> = free.iter().copied().map(String::from).collect();
+        let baseline = baseline_of(model, &rig, &free).unwrap();
+        let p = baseline.free.iter().map(|base| base.parameter.mean).collect();
+        check(&Problem::new(&logs, &baseline, &[]), p)
     }
+
+    /// The four numbers of the curve come first.
+    const FREE: [&str; 5] = ["a0", "a1", "v0_m_s", "a2_s_per_m", "sigma0_n_per_m"];
 
     #[test]
     fn slopes_over_the_curve_make_those_over_the_laws_numbers() {
-        let rig = RigFile::assumed_rig(&[]).unwrap();
-        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
-        let baseline = baseline_of(&model(&NUMBERS), &rig, &free()).unwrap();
-        let problem = Problem::new(&logs, &baseline, &[]);
-        let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
-        let fit = problem.fit(&[], p.clone(), 0, Near::Nothing);
-        let seen = Likelihood::about(&problem, &fit).seen;
-        assert_eq!(seen.speeds_m_s.len(), SPEEDS);
-        let slopes = problem.slopes_of(&fit);
-        let slip: Vec<f64> = problem.predict(&[], &p).observed.into_iter().flat_map(|o| o.slip_m_s).collect();
-        let columns = seen.columns(&slip, slopes.gain(), slopes.base());
-        let to_seen = derivatives(&p, |p| seen.at(p));
-        for i in 0..4 {
-            let own = &slopes.base()[i];
-            let made =
-                |t: usize| columns.iter().enumerate().map(|(k, c)| c[t] * to_seen[(k, i)]).sum::<f64>();
-            let off: f64 = own.iter().enumerate().map(|(t, own)| (own - made(t)).powi(2)).sum();
-            let size: f64 = own.iter().map(|own| own * own).sum();
-            assert!(off < 0.01 * size, "{i}: {off} of {size}");
-        }
+        with_free(&model(&NUMBERS), &FREE, |problem, p| {
+            let fit = problem.fit(&[], p.clone(), 0, Near::Nothing);
+            let seen = Likelihood::about(problem, &fit).seen;
+            assert_eq!(seen.speeds_m_s.len(), SPEEDS);
+            let slopes = problem.slopes_of(&fit);
+            let observed = problem.predict(&[], &p).observed;
+            let slip: Vec<f64> = observed.into_iter().flat_map(|o| o.slip_m_s).collect();
+            let columns = seen.columns(&slip, slopes.gain(), slopes.base());
+            let to_seen = derivatives(&p, |p| seen.at(p));
+            for i in 0..4 {
+                let own = &slopes.base()[i];
+                let made =
+                    |t: usize| columns.iter().enumerate().map(|(k, c)| c[t] * to_seen[(k, i)]).sum::<f64>();
+                let off: f64 = own.iter().enumerate().map(|(t, own)| (own - made(t)).powi(2)).sum();
+                let size: f64 = own.iter().map(|own| own * own).sum();
+                assert!(off < 0.01 * size, "{i}: {off} of {size}");
+            }
+        });
     }
 
     #[test]
     fn a_bent_ridge_is_followed_to_its_lowest_point_from_either_end() {
-        let rig = RigFile::assumed_rig(&[]).unwrap();
-        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
-        let baseline = baseline_of(&model(&NUMBERS), &rig, &free()).unwrap();
-        let problem = Problem::new(&logs, &baseline, &[]);
-        // About the same curve over what is slid, with v0 at half and at twice of what it is.
-        let ends = [[1.2, 0.8, 0.5, 0.7], [0.7, 1.3, 2.0, 1.4]].map(|factors: [f64; 4]| {
-            let mut p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
-            p.iter_mut().zip(factors).for_each(|(p, factor)| *p += factor.ln());
-            problem.fit(&[], p, 0, Near::Nothing)
+        with_free(&model(&NUMBERS), &FREE, |problem, file| {
+            // About the same curve over what is slid, with v0 at half and at twice of what it is.
+            let ends = [[1.2, 0.8, 0.5, 0.7], [0.7, 1.3, 2.0, 1.4]].map(|factors: [f64; 4]| {
+                let mut p = file.clone();
+                p.iter_mut().zip(factors).for_each(|(p, factor)| *p += factor.ln());
+                problem.fit(&[], p, 0, Near::Nothing)
+            });
+            let apart = |follow: &dyn Fn(Fit) -> Fit| {
+                let [a, b] = ends.clone().map(|end| (0..4).fold(end, |fit, _| follow(fit)).cost);
+                (a - b).abs()
+            };
+            let straight = apart(&|fit| problem.fit(&[], fit.p, 4, Near::Nothing));
+            let bent = apart(&|fit| along_curve(problem, fit));
+            // One standard deviation costs a half.
+            assert!(bent < 0.5 && straight > 4.0 * bent, "{bent} {straight}");
         });
-        let apart = |follow: &dyn Fn(Fit) -> Fit| {
-            let [a, b] = ends.clone().map(|end| (0..4).fold(end, |fit, _| follow(fit)).cost);
-            (a - b).abs()
-        };
-        let straight = apart(&|fit| problem.fit(&[], fit.p, 4, Near::Nothing));
-        let bent = apart(&|fit| along_curve(&problem, fit));
-        // One standard deviation costs a half.
-        assert!(bent < 0.5 && straight > 4.0 * bent, "{bent} {straight}");
     }
 
     #[test]
     fn a_curve_that_is_not_asked_for_leaves_the_values_themselves() {
-        let rig = RigFile::assumed_rig(&[]).unwrap();
-        let logs = [ContactLog::new(&log(&rig, 0.01), &rig).unwrap()];
-        let baseline = baseline_of(&model(&NUMBERS), &rig, &["a0".to_string()]).unwrap();
-        let problem = Problem::new(&logs, &baseline, &[]);
-        let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
-        let fit = problem.fit(&[], p, 4, Near::Nothing);
-        let seen = Likelihood::about(&problem, &fit).seen;
-        assert_eq!(seen.at(&fit.p).as_slice(), fit.p);
+        with_free(&model(&NUMBERS), &["a0"], |problem, p| {
+            let fit = problem.fit(&[], p, 4, Near::Nothing);
+            let seen = Likelihood::about(problem, &fit).seen;
+            assert_eq!(seen.at(&fit.p).as_slice(), fit.p);
+        });
+    }
+
+    /// What breaks away shows it: were it a number of the curve that is slid, nothing but the prior would hold it.
+    #[test]
+    fn static_friction_of_a_brush_is_seen_for_itself() {
+        let numbers = [("mu_s", 0.9), ("mu_c", 0.6), ("c_n_per_m", 3e4)];
+        let brush = ModelFile::new("model", ModelKind::Brush, &numbers).unwrap();
+        with_free(&brush, &["mu_s", "mu_c", "c_n_per_m"], |problem, p| {
+            let seen = Likelihood::about(problem, &problem.fit(&[], p.clone(), 0, Near::Nothing)).seen;
+            let mut other = p.clone();
+            other[0] += 0.1;
+            assert!((seen.at(&other) - seen.at(&p)).amax() > 0.05);
+        });
     }
 }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::contact::baseline::KNOWN_WITHIN;
 use super::contact::problem::{Baseline, Role};
-use super::fit_curve::{Likelihood, Posterior, Seen, derivatives, is_of_curve, speeds};
+use super::fit_curve::{Likelihood, Number, Posterior, Seen, derivatives, numbers_of_curve, speeds};
 use super::fit_interval::Known;
 use super::linear;
 use crate::fit::covariance::INTERVAL_95;
@@ -47,16 +47,14 @@ const FARTHEST: f64 = 2.0;
 const POINTS: usize = 12;
 /// The profile ends here within this share of [`INTERVAL_95`].
 const ENDS_WITHIN: f64 = 0.01;
-/// Share of the samples that slid slower than all speeds of the curve, and as many faster, where it is seen at no more than it has numbers.
+/// Share of the samples that slid slower than all speeds of the curve, and as many faster, where it is seen at no more than it has
+/// numbers.
 const OUTSIDE: f64 = 0.03;
 /// Singular values of the map to what is seen below this share of the largest: then no ridge can be followed.
 const LOST: f64 = 1e-7;
 
-/// ln of a parameter of the file.
-type Log<'a> = &'a dyn Fn(&[f64]) -> f64;
-
-/// Where the profile of a parameter ends in one direction.
-fn end(posterior: &Posterior<'_>, top: &[f64], of: Log<'_>, deviation: f64, direction: f64) -> f64 {
+/// Where the profile of a parameter ends in one direction, `of` being its ln.
+fn end(posterior: &Posterior<'_>, top: &[f64], of: Number<'_>, deviation: f64, direction: f64) -> f64 {
     let least = posterior.residuals(top).norm_squared();
     let centre = of(top);
     let mut p = top.to_vec();
@@ -119,8 +117,8 @@ impl<'a> Told<'a> {
         known: &Known,
         slid_m_s: Vec<f64>,
     ) -> Option<Self> {
-        let count = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
-        let seen = Seen { baseline, speeds_m_s: speeds(slid_m_s, count, OUTSIDE)? };
+        let speeds_m_s = speeds(slid_m_s, numbers_of_curve(baseline), OUTSIDE)?;
+        let seen = Seen { baseline, speeds_m_s };
         let g = derivatives(p, |p| seen.at(p));
         let singular = g.clone().svd(false, false).singular_values;
         let ratio = singular.min() / singular.max();
@@ -143,8 +141,7 @@ pub(super) fn profiles(
     let baseline = seen.baseline;
     let correction = seen.at(p) - seen.at(found);
     // An error of the curve's form is one for each of the law's numbers, and is spread over all speeds that are looked at.
-    let numbers_of_curve = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
-    let spread = (seen.speeds_m_s.len() as f64 / numbers_of_curve.max(1) as f64).sqrt();
+    let spread = (seen.speeds_m_s.len() as f64 / numbers_of_curve(baseline).max(1) as f64).sqrt();
     let curve = seen.of_slip_error(p, slip_error_m_s).into_iter().map(|of_slip| of_slip.hypot(form.curve));
     let curve = curve.zip(correction.iter());
     let of_curve = curve.map(|(form, correction)| spread * form.hypot(CORRECTION_UNKNOWN * correction));
@@ -193,7 +190,7 @@ mod tests {
         let p: Vec<f64> = baseline.free.iter().map(|base| base.parameter.mean).collect();
         let slid = || (1..1000).map(|i| 1e-3 * f64::from(i)).collect::<Vec<f64>>();
         // Where the likelihood is quadratic, carried back to the parameters.
-        let count = baseline.free.iter().filter(|base| is_of_curve(base.role)).count();
+        let count = numbers_of_curve(&baseline);
         let straight = |deviation: f64| {
             let seen = Seen { baseline: &baseline, speeds_m_s: speeds(slid(), count, OUTSIDE).unwrap() };
             let g = derivatives(&p, |p| seen.at(p));

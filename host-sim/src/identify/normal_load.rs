@@ -208,8 +208,8 @@ pub fn balance(logs: &[NormalLoadLog], rig: &RigFile, scales: &NormalLoadScales)
         .with_noise_in(GAIN, noise_nm)
 }
 
-/// Noise of normal force and torque in the balance, N m, from the logs and their filtered torques. That of the force is not white: all counts that the torque does not have,
-/// faster than what springs make slowly.
+/// Noise of normal force and torque in the balance, N m, from the logs and their filtered torques. That of the force is not white:
+/// all counts that the torque does not have, faster than what springs make slowly.
 fn noise_of_both(logs: &[NormalLoadLog], torque_nm: &[Vec<f64>], gain: f64) -> [f64; 2] {
     let of_log = |(log, torque_nm): (&NormalLoadLog, &Vec<f64>)| {
         let apart: Vec<f64> = torque_nm.iter().zip(&log.filtered_n).map(|(nm, n)| nm - n / gain).collect();
