@@ -6,21 +6,29 @@
 //! correlated over less than a block give the larger variance that they deserve. Left out: correlation
 //! longer than a block, so 40 blocks are taken, each 1/40 of the record.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 /// Number of blocks.
 pub const BLOCKS: usize = 40;
 
-/// Covariance of the parameters; `None` where JᵀJ cannot be inverted. `slow` is the covariance that noise slower than a block
-/// gives Jᵀr, where it is known.
+/// Blocks of so many samples.
+pub fn blocks_of(samples: usize) -> Vec<Range<usize>> {
+    let blocks = BLOCKS.min(samples / 2).max(1);
+    (0..blocks).map(|block| block * samples / blocks..(block + 1) * samples / blocks).collect()
+}
+
+/// Covariance of the parameters; `None` where JᵀJ cannot be inverted. `slow` makes the covariance of Jᵀr of that of blocks, where
+/// noise is slower than one.
 pub fn sandwich(
     jacobian: &DMatrix<f64>,
     residual: &DVector<f64>,
-    slow: Option<&DMatrix<f64>>,
+    slow: Option<&dyn Fn(DMatrix<f64>) -> DMatrix<f64>>,
 ) -> Option<DMatrix<f64>> {
     let (samples, parameters) = jacobian.shape();
-    let blocks = BLOCKS.min(samples / 2).max(1);
-    if samples <= parameters || blocks <= parameters {
+    let blocks = blocks_of(samples);
+    if samples <= parameters || blocks.len() <= parameters {
         return None;
     }
     // Columns are scaled to length one for the inverse, and scaled back after it.
@@ -30,19 +38,20 @@ pub fn sandwich(
     });
     let inverse = (scaled.transpose() * &scaled).try_inverse()?;
     let mut spread = DMatrix::zeros(parameters, parameters);
-    for block in 0..blocks {
-        let (from, to) = (block * samples / blocks, (block + 1) * samples / blocks);
-        let rows = scaled.rows(from, to - from);
-        let score = rows.transpose() * residual.rows(from, to - from);
+    for block in &blocks {
+        let score = scaled.rows_range(block.clone()).transpose() * residual.rows_range(block.clone());
         spread += &score * score.transpose();
     }
     // Fitting p parameters removes p of the blocks' degrees of freedom.
-    spread *= blocks as f64 / (blocks - parameters) as f64;
+    spread *= blocks.len() as f64 / (blocks.len() - parameters) as f64;
+    let of_jacobian = |of_scaled: &DMatrix<f64>, back: i32| {
+        DMatrix::from_fn(parameters, parameters, |i, j| of_scaled[(i, j)] * (norms[i] * norms[j]).powi(back))
+    };
     if let Some(slow) = slow {
-        spread += DMatrix::from_fn(parameters, parameters, |i, j| slow[(i, j)] / (norms[i] * norms[j]));
+        spread = of_jacobian(&slow(of_jacobian(&spread, 1)), -1);
     }
     let covariance = &inverse * spread * &inverse;
-    Some(DMatrix::from_fn(parameters, parameters, |i, j| covariance[(i, j)] / (norms[i] * norms[j])))
+    Some(of_jacobian(&covariance, -1))
 }
 
 /// Correlations from a covariance.

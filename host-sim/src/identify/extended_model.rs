@@ -175,7 +175,7 @@ impl FittedLaws {
     fn new(problem: &Problem<'_>, fit: Fit) -> Self {
         let columns = problem.jacobian(&fit.terms, &fit.p, &fit.r);
         let prior_sd: Vec<f64> = problem.parameters(&fit.terms).map(|q| q.sd).collect();
-        let covariance = Linearised::new(problem, &fit, &columns).known(&prior_sd).covariance;
+        let covariance = Linearised::new(problem, &fit, &columns).known(&prior_sd, prior_sd.len()).covariance;
         Self { fit, columns, covariance }
     }
 }

@@ -16,12 +16,11 @@ use super::contact::problem::{Baseline, DRIFT, Fit, Near, Problem, Role};
 use super::contact::smoothing::OBSERVED_OVER;
 use super::filters::rms;
 use super::fit_bias::Resimulated;
-use super::fit_curve::{Likelihood, along_curve, is_of_curve, slid_m_s};
+use super::fit_curve::{Likelihood, along_curve, slid_m_s};
 use super::fit_interval::Linearised;
 use super::fit_parameters::{baseline_of, log_derivatives, set_all, values};
 use super::fit_profile::{Form, Told, profiles};
 use super::fit_simulated::{Simulated, smoothed_rms};
-use super::linear;
 use crate::files::log::Log;
 use crate::files::model_file::{Interval, ModelFile};
 use crate::files::rig_file::RigFile;
@@ -214,12 +213,10 @@ pub fn identify(
 
     let prior_sd: Vec<f64> = baseline.free.iter().map(|base| base.parameter.sd).collect();
     let alone: Vec<f64> = prior_sd.iter().map(|sd| WIDER * sd).collect();
-    let (mut likely, mut under_prior, pretended) = {
+    let (mut likely, mut under_prior) = {
         let slopes = problem.jacobian(&[], &fit.p, &fit.r);
         let linearised = Linearised::new(&problem, &fit, &slopes);
-        let (mut h, _) = problem.normal_equations(&slopes, &fit.r);
-        alone.iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
-        (linearised.known(&alone), linearised.known(&prior_sd).covariance, linear::factor(&h).inverse())
+        (linearised.known(&alone, alone.len()), linearised.known(&prior_sd, alone.len()).covariance)
     };
     let mut found = fit.p.clone();
     let left = problem.measured().zip(problem.predict(&[], &found).shown_nm).map(|(y, x)| y - x);
@@ -234,9 +231,12 @@ pub fn identify(
         None
     } else {
         let likelihood = Likelihood::about(&problem, &fit);
+        let columns = likelihood.seen.slopes(&problem, &fit, &problem.predict(&[], &fit.p));
+        let likely =
+            Linearised::new(&problem, &fit, &columns).known(&likelihood.seen.held_within(), prior_sd.len());
         let resimulated = Resimulated { model, rig, baseline: &baseline, free, raw };
         fit.p = resimulated.unbiased(&problem, (&found, &likelihood), progress)?;
-        Some(likelihood)
+        Some((likelihood, likely.covariance))
     };
     let prediction = problem.predict(&[], &fit.p);
     let usual_m_s = logs.iter().map(|log| rms(&log.root_speed_m_s)).fold(0.0, f64::max);
@@ -245,15 +245,9 @@ pub fn identify(
     let known_to = (smoothing_s, DRIFT * usual_m_s, form);
     let logs_of = |p: &[f64]| DVector::from_vec(values(model, &baseline, p, free)).map(f64::ln);
     let to_log = log_derivatives(model, &baseline, &fit.p, free);
-    let of_curve = |name: &String| {
-        baseline.free.iter().any(|base| base.parameter.name == *name && is_of_curve(base.role))
-    };
-    let curve: Vec<usize> = (0..free.len()).filter(|i| of_curve(&free[*i])).collect();
     let told = match observed {
         None => Told::known(&baseline, &fit.p, &likely, slid_m_s(&prediction)),
-        Some(likelihood) => {
-            Some(Told::observed(likelihood, [&likely.covariance, &pretended], &to_log, &curve))
-        }
+        Some((likelihood, likely)) => Some(Told::observed(likelihood, likely)),
     };
     let before = values(model, &baseline, &found, free);
     let values = values(model, &baseline, &fit.p, free);

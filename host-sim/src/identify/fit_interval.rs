@@ -64,11 +64,11 @@ impl<'a> Linearised<'a> {
         }
     }
 
-    /// What it says of parameters whose prior is `prior_sd`.
-    pub(super) fn known(&self, prior_sd: &[f64]) -> Known {
+    /// What it says of parameters whose prior is `prior_sd`, `fitted` of them having been fitted to the residuals.
+    pub(super) fn known(&self, prior_sd: &[f64], fitted: usize) -> Known {
         let Self { columns, r, deviation_nm, slides, lengths } = self;
         let n = columns.len();
-        let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
+        let score: Vec<f64> = r.iter().map(|r| score(*r)).collect();
         let slope: Vec<f64> = r
             .iter()
             .map(|r| {
@@ -76,8 +76,7 @@ impl<'a> Linearised<'a> {
             })
             .collect();
         // In units of the prior, so that the inverse is of numbers of one size.
-        let scaled: Vec<Vec<f64>> =
-            columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
+        let scaled = scaled(columns, prior_sd);
         let (mut h, _) = linear::normal_equations(&scaled, &slope, r);
         let blocks = blocks(lengths);
         let residual = r.iter().zip(*deviation_nm).zip(slides);
@@ -88,14 +87,14 @@ impl<'a> Linearised<'a> {
         };
         let gradients: Vec<Vec<f64>> = scaled.iter().map(gradient).collect();
         let errors = Errors { residual: &residual, deviation: deviation_nm, lengths };
-        let mut spread = DMatrix::identity(n, n)
-            + errors.spread_of_slow_noise(&gradients, r.len() as f64 / blocks.len().max(1) as f64);
-        let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(n)).max(1) as f64;
-        for block in blocks {
+        let mut spread = DMatrix::identity(n, n);
+        let freedom = blocks.len() as f64 / (blocks.len().saturating_sub(fitted)).max(1) as f64;
+        for block in &blocks {
             let sum =
                 DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
             spread += freedom * &sum * sum.transpose();
         }
+        let spread = errors.across_blocks(&gradients, &blocks, spread);
         for i in 0..n {
             h[(i, i)] += 1.0;
         }
@@ -109,6 +108,15 @@ impl<'a> Linearised<'a> {
     }
 }
 
+/// Slope of −ln of Student's likelihood over the residual.
+fn score(r: f64) -> f64 {
+    (FREEDOM + 1.0) * r / (FREEDOM + r * r)
+}
+
+fn scaled(columns: &[Slope], by: &[f64]) -> Vec<Vec<f64>> {
+    columns.iter().zip(by).map(|(c, by)| c.iter().map(|x| x * by).collect()).collect()
+}
+
 /// Samples that count as one to what is fitted: tr(V₀⁻¹V) over its expectation, V the variance of the score from blocks and V₀ that
 /// of samples that are independent (Pauli, Racugno and Ventura 2011 scale a composite likelihood so). An error that repeats
 /// itself, as that of a swing between two samples does, has no slow part and yet says the same again and again.
@@ -118,9 +126,8 @@ impl<'a> Linearised<'a> {
 /// those that are seen in one nothing.
 pub(super) fn repeated(columns: &[Slope], r: &[f64], lengths: &[usize], prior_sd: &[f64]) -> f64 {
     let n = columns.len();
-    let score: Vec<f64> = r.iter().map(|r| (FREEDOM + 1.0) * r / (FREEDOM + r * r)).collect();
-    let scaled: Vec<Vec<f64>> =
-        columns.iter().zip(prior_sd).map(|(c, sd)| c.iter().map(|x| x * sd).collect()).collect();
+    let score: Vec<f64> = r.iter().map(|r| score(*r)).collect();
+    let scaled = scaled(columns, prior_sd);
     let squares: Vec<f64> = score.iter().map(|s| s * s).collect();
     let of_block = |block: std::ops::Range<usize>| {
         let sum = DVector::from_fn(n, |i, _| linear::dot(&scaled[i][block.clone()], &score[block.clone()]));
@@ -206,7 +213,8 @@ mod tests {
     fn of(columns: &[Slope], r: &[f64], prior_sd: &[f64]) -> Known {
         let deviation_nm = &vec![1.0; r.len()];
         let (slides, lengths) = (vec![true; r.len()], vec![r.len()]);
-        Linearised { columns: columns.into(), r: r.into(), deviation_nm, slides, lengths }.known(prior_sd)
+        Linearised { columns: columns.into(), r: r.into(), deviation_nm, slides, lengths }
+            .known(prior_sd, columns.len())
     }
 
     #[test]

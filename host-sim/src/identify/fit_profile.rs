@@ -43,6 +43,8 @@ impl Form {
 const HELD: f64 = 0.01;
 /// A profile is followed so far, in ln: beyond a factor of e either way a parameter counts as not determined.
 const FARTHEST: f64 = 2.0;
+/// How often an end is sought with the uncertainty of the way to the last: where the ridge is bent that is another than at its top.
+const ROUNDS: usize = 4;
 /// Points of a profile at most on either side: it is close to a straight line in the root of what it falls by.
 const POINTS: usize = 12;
 /// The profile ends here within this share of [`INTERVAL_95`].
@@ -53,8 +55,8 @@ const OUTSIDE: f64 = 0.03;
 /// Singular values of the map to what is seen below this share of the largest: then no ridge can be followed.
 const LOST: f64 = 1e-7;
 
-/// Where the profile of a parameter ends in one direction, `of` being its ln.
-fn end(posterior: &Posterior<'_>, top: &[f64], of: Number<'_>, deviation: f64, direction: f64) -> f64 {
+/// Values where the profile of a parameter ends in one direction, `of` being its ln.
+fn end(posterior: &Posterior<'_>, top: &[f64], of: Number<'_>, deviation: f64, direction: f64) -> Vec<f64> {
     let least = posterior.residuals(top).norm_squared();
     let centre = of(top);
     let mut p = top.to_vec();
@@ -69,7 +71,7 @@ fn end(posterior: &Posterior<'_>, top: &[f64], of: Number<'_>, deviation: f64, d
         let fell = (posterior.residuals(&p).norm_squared() - least).max(0.0).sqrt();
         if (fell - INTERVAL_95).abs() < ENDS_WITHIN * INTERVAL_95 || (away >= FARTHEST && fell < INTERVAL_95)
         {
-            return centre + direction * here;
+            return p;
         }
         let slope = (fell - last.0) / (here - last.1);
         let next = here + (INTERVAL_95 - fell) / slope;
@@ -77,7 +79,7 @@ fn end(posterior: &Posterior<'_>, top: &[f64], of: Number<'_>, deviation: f64, d
         // A flat stretch says little of how far it goes.
         away = if slope > 0.0 { next.clamp(0.5 * here, 2.0 * here) } else { 2.0 * here };
     }
-    centre + direction * last.1
+    p
 }
 
 /// What a likelihood says in what is seen, and how much more uncertain each of the file's parameters is than it pretends.
@@ -87,26 +89,15 @@ pub(super) struct Told<'a> {
     pub(super) to_top: DVector<f64>,
     /// Its covariance.
     pub(super) covariance: DMatrix<f64>,
-    /// Variance of each of the file's parameters, in ln, over what the covariance makes of it, where that is another.
-    pub(super) larger: Option<Vec<f64>>,
+    /// The one that it has in truth, where that is another: as wide along each way, and not of its form, which forty blocks leave open.
+    pub(super) likely: Option<DMatrix<f64>>,
 }
 
 impl<'a> Told<'a> {
-    /// Of a likelihood whose samples are taken for independent ones; `likely` is what is known of the values when they are not, and
-    /// `pretended` their covariance when they are. `curve` are the places of the curve's numbers among the file's parameters: a ridge
-    /// that is bent has another of them as its direction elsewhere, so they share the largest.
-    pub(super) fn observed(
-        likelihood: Likelihood<'a>,
-        [likely, pretended]: [&DMatrix<f64>; 2],
-        to_logs: &DMatrix<f64>,
-        curve: &[usize],
-    ) -> Self {
-        let of_logs = |covariance: &DMatrix<f64>| (to_logs * covariance * to_logs.transpose()).diagonal();
-        let mut larger = of_logs(likely).component_div(&of_logs(pretended)).as_slice().to_vec();
-        let largest = curve.iter().map(|i| larger[*i]).fold(0.0, f64::max);
-        curve.iter().for_each(|i| larger[*i] = largest);
+    /// Of a likelihood whose samples are taken for independent ones; `likely` is its covariance when they are not.
+    pub(super) fn observed(likelihood: Likelihood<'a>, likely: DMatrix<f64>) -> Self {
         let Likelihood { seen, to_top, covariance, .. } = likelihood;
-        Self { seen, to_top, covariance, larger: Some(larger) }
+        Self { seen, to_top, covariance, likely: Some(likely) }
     }
 
     /// Of a covariance of the values that is as it is known, about values `p`. `None` where what is seen has no inverse, as in
@@ -123,7 +114,7 @@ impl<'a> Told<'a> {
         let singular = g.clone().svd(false, false).singular_values;
         let ratio = singular.min() / singular.max();
         let covariance = &g * &known.covariance * g.transpose();
-        (ratio > LOST).then(|| Self { seen, to_top: &g * &known.to_top, covariance, larger: None })
+        (ratio > LOST).then(|| Self { seen, to_top: &g * &known.to_top, covariance, likely: None })
     }
 }
 
@@ -137,7 +128,7 @@ pub(super) fn profiles(
     logs: impl Fn(&[f64]) -> DVector<f64>,
     deviations: &[f64],
 ) -> Vec<(f64, f64)> {
-    let Told { seen, to_top, covariance, larger } = told;
+    let Told { seen, to_top, covariance, likely } = told;
     let baseline = seen.baseline;
     let correction = seen.at(p) - seen.at(found);
     // An error of the curve's form is one for each of the law's numbers, and is spread over all speeds that are looked at.
@@ -161,16 +152,30 @@ pub(super) fn profiles(
     let of_form = DVector::from_vec(of_curve.chain(of_others).map(|sd| sd * sd).collect());
     // The prior holds what was found; the likelihood's own top lies beyond.
     let top = seen.at(p) + to_top;
-    let mut posterior = Posterior { seen, top, spread: DMatrix::zeros(0, 0) };
+    let of_form = DMatrix::from_diagonal(&of_form);
+    let information = linear::factor(&covariance);
+    // Variance along the way between these values over what independent samples would leave.
+    let larger = |p: &[f64], q: &[f64]| {
+        let way = seen.at(q) - seen.at(p);
+        let along = information.solve(&way);
+        let own = way.dot(&along).max(f64::MIN_POSITIVE);
+        likely.as_ref().map_or(1.0, |likely| along.dot(&(likely * &along)) / own)
+    };
+    let mut posterior = Posterior { seen: seen.clone(), top, spread: DMatrix::zeros(0, 0) };
     let mut ends = Vec::with_capacity(deviations.len());
     for (which, deviation) in deviations.iter().enumerate() {
-        let larger = larger.as_ref().map_or(1.0, |larger| larger[which]);
-        let of_seen = larger * &covariance + DMatrix::from_diagonal(&of_form);
-        posterior.spread = linear::factor(&of_seen).l();
-        let best = posterior.best(p, None);
         let of = |p: &[f64]| logs(p)[which];
-        let end = |direction: f64| end(&posterior, &best, &of, *deviation, direction);
-        ends.push((end(-1.0), end(1.0)));
+        let mut end_towards = |direction: f64| {
+            let (mut scale, mut ended) = (1.0, p.to_vec());
+            for _ in 0..ROUNDS {
+                posterior.spread = linear::factor(&(scale * &covariance + &of_form)).l();
+                let best = posterior.best(p, None);
+                ended = end(&posterior, &best, &of, *deviation, direction);
+                scale = larger(&best, &ended);
+            }
+            of(&ended)
+        };
+        ends.push((end_towards(-1.0), end_towards(1.0)));
     }
     ends
 }

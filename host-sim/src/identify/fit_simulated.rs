@@ -25,7 +25,7 @@ use super::slow_noise::Errors;
 use crate::files::log::Log;
 use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::RigFile;
-use crate::fit::covariance::{BLOCKS, sandwich};
+use crate::fit::covariance::{blocks_of, sandwich};
 use crate::input_error::InputError;
 use crate::least_squares::Problem;
 use crate::predict::curve::shifted;
@@ -85,9 +85,8 @@ impl SimulatedFit {
         let deviation = vec![rms(residual); residual.len()];
         let columns: Vec<Vec<f64>> =
             self.jacobian.column_iter().map(|c| c.iter().copied().collect()).collect();
-        let block = residual.len() as f64 / BLOCKS as f64;
-        let slow = Errors { residual, deviation: &deviation, lengths: &self.lengths }
-            .spread_of_slow_noise(&columns, block);
+        let errors = Errors { residual, deviation: &deviation, lengths: &self.lengths };
+        let slow = |within| errors.across_blocks(&columns, &blocks_of(residual.len()), within);
         let covariance = sandwich(&self.jacobian, &self.residual_nm, Some(&slow))?;
         let normal = factor(&(self.jacobian.transpose() * &self.jacobian));
         Some(Known { covariance, to_top: -normal.solve(&(self.jacobian.transpose() * &self.residual_nm)) })
