@@ -102,7 +102,7 @@ impl Resimulated<'_> {
                     let noisy = values.iter().map(|x| x + sign * noise * white.next()).collect();
                     shown.set_signal(*signal, noisy);
                 }
-                logs.push(ContactLog::new(&shown, self.rig)?);
+                logs.push(ContactLog::new(&shown, self.rig)?.at_rest_for(&self.baseline.numbers));
             }
             let problem = Problem::new(&logs, self.baseline, &[]);
             let noise = problem.noise_at(&[], p).fitted_as(&logs, &measured.noise);

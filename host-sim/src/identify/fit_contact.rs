@@ -184,7 +184,8 @@ pub fn identify(
     let refuse = |why: FitError| InputError::new(why.to_string()).file(model.source.as_str());
     let baseline = baseline_of(model, rig, free)?;
     let raw = logs;
-    let logs = raw.iter().map(|log| ContactLog::new(log, rig)).collect::<Result<Vec<_>, _>>()?;
+    let prepared = |log| Ok(ContactLog::new(log, rig)?.at_rest_for(&baseline.numbers));
+    let logs = raw.iter().map(prepared).collect::<Result<Vec<_>, InputError>>()?;
     let samples = logs.iter().flat_map(|log| &log.usable).filter(|used| **used).count();
     let needed = SAMPLES_PER_PARAMETER * baseline.free.len();
     if samples < needed {

@@ -11,7 +11,9 @@ use super::smoothing::{OBSERVED_OVER, Smoothing};
 use crate::files::log::{Log, unwrapped};
 use crate::files::rig_file::{Bridge, RigFile};
 use crate::files::signal::Signal;
-use crate::identify::filters::{gaussian, gradient, local_maximum, rms, shifted, smoothed_flat};
+use crate::identify::filters::{
+    gaussian, gradient, local_maximum, rms, shifted, smoothed_flat, smoothed_together,
+};
 use crate::identify::grid::Grid;
 use crate::identify::mains;
 use crate::identify::noise;
@@ -112,7 +114,6 @@ impl ContactLog {
             Motion::new(&grid, speed_column.as_ref(), angle_column.as_deref());
         let radius_m = rig.friction_radius_m;
         let root_m: Vec<f64> = angle_rad.iter().map(|a| radius_m * a).collect();
-        let speed: Vec<f64> = gradient(&root_m).iter().map(|d| d / step_s).collect();
 
         let ahead = BridgeModel::delay_s(&rig.normal_bridge) / step_s;
         let load_n = shifted(&steady_smoothed(&normal_n, normal_noise_n), ahead);
@@ -126,7 +127,7 @@ impl ContactLog {
         usable.iter_mut().take(5).for_each(|u| *u = false);
         Ok(Self {
             source: log.source.clone(),
-            root_speed_m_s: gaussian(&speed, 3.0, 0),
+            root_speed_m_s: smooth_speed(&root_m, step_s),
             observed_nm: smoothed_flat(&friction_nm, OBSERVED_OVER),
             smoothing: Smoothing::default(),
             unseen_ringing: unseen_ringing(&rig.friction_bridge, step_s),
@@ -165,11 +166,23 @@ impl ContactLog {
         logs.iter().map(|log| Ok(Self::new(log, rig)?.seen_through(numbers))).collect()
     }
 
+    /// With a root that moves no more at rest than it must, where bristles without a block follow it: over a single count of the
+    /// encoder they would show a good part of the friction.
+    #[must_use]
+    pub fn at_rest_for(mut self, numbers: &Numbers) -> Self {
+        if numbers.bristles_alone {
+            let noise_m = noise::standard_deviation(&self.root_m);
+            self.root_m = smoothed_together([(&self.root_m, noise_m)]);
+            self.root_speed_m_s = smooth_speed(&self.root_m, self.grid.step_s);
+        }
+        self
+    }
+
     /// Smoothed as far as it takes to tell slip from the channel's noise through a model's block.
     #[must_use]
     pub fn seen_through(mut self, numbers: &Numbers) -> Self {
         if numbers.bristles_alone {
-            return self;
+            return self.at_rest_for(numbers);
         }
         let noise_n = self.friction_noise_nm / self.radius_m;
         let told_m_s = SLIP_NOISES
@@ -189,8 +202,7 @@ impl ContactLog {
     #[must_use]
     pub fn following(&self, angle_rad: &[f64]) -> Self {
         let root_m: Vec<f64> = angle_rad.iter().map(|a| self.radius_m * a).collect();
-        let speed: Vec<f64> = gradient(&root_m).iter().map(|d| d / self.grid.step_s).collect();
-        let root_speed_m_s = gaussian(&speed, 3.0, 0);
+        let root_speed_m_s = smooth_speed(&root_m, self.grid.step_s);
         Self { angle_rad: angle_rad.to_vec(), root_m, root_speed_m_s, ..self.clone() }
     }
 
@@ -264,6 +276,11 @@ fn unseen_ringing(bridge: &Bridge, step_s: f64) -> Option<(f64, f64)> {
     Some((passes * std::f64::consts::FRAC_1_SQRT_2, (-decay * step_s).exp()))
 }
 
+fn smooth_speed(way_m: &[f64], step_s: f64) -> Vec<f64> {
+    let speed: Vec<f64> = gradient(way_m).iter().map(|d| d / step_s).collect();
+    gaussian(&speed, 3.0, 0)
+}
+
 fn magnitudes(values: &[f64]) -> Vec<f64> {
     values.iter().map(|x| x.abs()).collect()
 }
@@ -281,4 +298,60 @@ fn steady_smoothed(values: &[f64], noise: f64) -> Vec<f64> {
             weight * narrow[i] + (1.0 - weight) * wide[i]
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::baseline::baseline;
+    use super::*;
+    use crate::files::model_file::{ModelFile, ModelKind};
+
+    const COUNT_RAD: f64 = 5.2e-5;
+    const RESTS: std::ops::Range<usize> = 0..2000;
+
+    /// A disc that rests at the edge of a count, as a trembling of a fifth of one shows, and then turns to and fro.
+    fn log() -> Log {
+        let turned = |i: usize| {
+            if RESTS.contains(&i) {
+                (0.5 + 0.2 * (2.3 * i as f64).sin()) * COUNT_RAD
+            } else {
+                let t = 1e-3 * (i - RESTS.end) as f64;
+                0.5 * COUNT_RAD + 0.1 * (1.0 - (20.0 * t).cos())
+            }
+        };
+        let mut log = Log::default();
+        log.set_signal(Signal::Time, (0..6000).map(|i| 1e-3 * i as f64).collect());
+        log.set_signal(
+            Signal::M2Angle,
+            (0..6000).map(|i| (turned(i) / COUNT_RAD).round() * COUNT_RAD).collect(),
+        );
+        log.set_signal(Signal::NormalForce, vec![60.0; 6000]);
+        log.set_signal(Signal::FrictionTorque, vec![1.0; 6000]);
+        log
+    }
+
+    #[test]
+    fn a_resting_root_is_still_for_bristles_alone_and_turns_where_the_disc_does() {
+        let rig = RigFile::assumed_rig(&[]).unwrap();
+        let lugre = [("sigma0_n_per_m", 2e7), ("a0", 0.6), ("a1", 0.4), ("v0_m_s", 0.1)];
+        let lugre = ModelFile::new("bristles", ModelKind::Lugre, &lugre).unwrap();
+        let root = |model: &ModelFile| {
+            let numbers = baseline(model, 0.1).numbers;
+            ContactLog::new(&log(), &rig).unwrap().at_rest_for(&numbers).root_m
+        };
+        let (shown, still) = (root(&ModelFile::assumed(&[]).unwrap()), root(&lugre));
+        let count_m = rig.friction_radius_m * COUNT_RAD;
+        let moves = |root: &[f64], range: std::ops::Range<usize>| {
+            let steps = root[range].windows(2).map(|w| w[1] - w[0]);
+            rms(&steps.collect::<Vec<_>>()) / count_m
+        };
+        assert!(moves(&shown, RESTS) > 0.5, "{}", moves(&shown, RESTS));
+        // Of means of 32 samples a sixth of one's noise is left in the difference of neighbours, at most.
+        assert!(moves(&still, 100..1900) < 0.05, "{}", moves(&still, 100..1900));
+        let furthest = shown.iter().zip(&still).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // Estimates that agree within three deviations each, √12 of which are a count.
+        assert!(furthest < 3.0 * count_m, "{furthest}");
+        let ways = moves(&still, 2100..6000) / moves(&shown, 2100..6000);
+        assert!((ways - 1.0).abs() < 1e-3, "{ways}");
+    }
 }
