@@ -69,6 +69,8 @@ pub struct ContactLog {
     pub friction_noise_nm: f64,
     /// Noise of the normal channel, N.
     pub normal_noise_n: f64,
+    /// Noise of the root's way where the angle was logged, m; else 0.
+    pub root_noise_m: f64,
     /// Noise of the root's speed from sample to sample, m/s.
     pub speed_noise_m_s: f64,
     /// What that speed is uncertain by beside it, m/s: of a disc that is reckoned and not seen.
@@ -110,7 +112,7 @@ impl ContactLog {
         let speed_column =
             log.signal(Signal::M2Speed).map(|speed| Speed { values_rad_s: on_grid(speed), lag_s });
         let angle_column = log.signal(Signal::M2Angle).map(|angle| on_grid(&unwrapped(angle)));
-        let Motion { angle_rad, slope_noise_rad_s, jitter_s } =
+        let Motion { angle_rad, slope_noise_rad_s, noise_rad, jitter_s } =
             Motion::new(&grid, speed_column.as_ref(), angle_column.as_deref());
         let radius_m = rig.friction_radius_m;
         let root_m: Vec<f64> = angle_rad.iter().map(|a| radius_m * a).collect();
@@ -133,6 +135,7 @@ impl ContactLog {
             unseen_ringing: unseen_ringing(&rig.friction_bridge, step_s),
             friction_late: BridgeModel::delay_s(&rig.friction_bridge) / step_s,
             ringing,
+            root_noise_m: radius_m * noise_rad,
             speed_noise_m_s: radius_m * slope_noise_rad_s,
             unsure_m_s: 0.0,
             jitter_s,
@@ -170,9 +173,8 @@ impl ContactLog {
     /// encoder they would show a good part of the friction.
     #[must_use]
     pub fn at_rest_for(mut self, numbers: &Numbers) -> Self {
-        if numbers.bristles_alone {
-            let noise_m = noise::standard_deviation(&self.root_m);
-            self.root_m = smoothed_together([(&self.root_m, noise_m)]);
+        if numbers.bristles_alone && self.root_noise_m > 0.0 {
+            self.root_m = smoothed_together([(&self.root_m, self.root_noise_m)]);
             self.root_speed_m_s = smooth_speed(&self.root_m, self.grid.step_s);
         }
         self

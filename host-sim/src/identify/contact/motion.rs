@@ -24,6 +24,8 @@ pub(super) struct Motion {
     pub(super) angle_rad: Vec<f64>,
     /// Noise of the angle's slope from sample to sample, rad/s.
     pub(super) slope_noise_rad_s: f64,
+    /// Noise of the angle itself, rad, where it is taken as it was logged; else 0: that of a speed's integral is no noise of samples.
+    pub(super) noise_rad: f64,
     /// By how much the instants of the logged angle jitter, s, where the speed is used for what is fast in its place.
     pub(super) jitter_s: Option<f64>,
 }
@@ -33,28 +35,36 @@ impl Motion {
     pub(super) fn new(grid: &Grid, speed: Option<&Speed>, angle: Option<&[f64]>) -> Self {
         let step_s = grid.step_s;
         let noise = |values: &[f64]| noise::standard_deviation(values);
-        let of =
-            |angle_rad: Vec<f64>, slope_noise_rad_s| Self { angle_rad, slope_noise_rad_s, jitter_s: None };
+        let of = |angle_rad: Vec<f64>, slope_noise_rad_s| Self {
+            angle_rad,
+            slope_noise_rad_s,
+            noise_rad: 0.0,
+            jitter_s: None,
+        };
+        let logged = |angle: &[f64]| {
+            let noise_rad = noise(angle);
+            Self { noise_rad, ..of(angle.to_vec(), std::f64::consts::SQRT_2 * noise_rad / step_s) }
+        };
         match (speed, angle) {
             (None, None) => of(vec![0.0; grid.len()], 0.0),
             (Some(Speed { values_rad_s, .. }), None) => {
                 of(integrated(values_rad_s, step_s), noise(values_rad_s))
             }
-            (None, Some(angle)) => of(angle.to_vec(), std::f64::consts::SQRT_2 * noise(angle) / step_s),
+            (None, Some(angle)) => logged(angle),
             (Some(Speed { values_rad_s, lag_s }), Some(angle)) => {
-                let of_slope = std::f64::consts::SQRT_2 * noise(angle) / step_s;
-                if *lag_s == 0.0 && noise(values_rad_s) < of_slope {
+                let logged = logged(angle);
+                if *lag_s == 0.0 && noise(values_rad_s) < logged.slope_noise_rad_s {
                     return of(blended(values_rad_s, angle, step_s), noise(values_rad_s));
                 }
                 let jitter = noise::jitter(angle);
                 let usual_rad = rms(values_rad_s) * step_s;
-                if jitter * usual_rad > noise(angle) && lag_s.abs() < LATEST * step_s {
+                if jitter * usual_rad > logged.noise_rad && lag_s.abs() < LATEST * step_s {
                     let both = blended(&shifted(values_rad_s, lag_s / step_s), angle, step_s);
                     if noise::jitter(&both) < 0.5 * jitter {
                         return Self { jitter_s: Some(jitter * step_s), ..of(both, noise(values_rad_s)) };
                     }
                 }
-                of(angle.to_vec(), of_slope)
+                logged
             }
         }
     }
