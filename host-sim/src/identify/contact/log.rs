@@ -69,7 +69,7 @@ pub struct ContactLog {
     pub friction_noise_nm: f64,
     /// Noise of the normal channel, N.
     pub normal_noise_n: f64,
-    /// Noise of the root's way where the angle was logged, m; else 0.
+    /// Noise of the root's way where an angle was logged, m; else 0.
     pub root_noise_m: f64,
     /// Noise of the root's speed from sample to sample, m/s.
     pub speed_noise_m_s: f64,

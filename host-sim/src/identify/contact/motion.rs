@@ -24,7 +24,7 @@ pub(super) struct Motion {
     pub(super) angle_rad: Vec<f64>,
     /// Noise of the angle's slope from sample to sample, rad/s.
     pub(super) slope_noise_rad_s: f64,
-    /// Noise of the angle itself, rad, where it is taken as it was logged; else 0: that of a speed's integral is no noise of samples.
+    /// Noise of the angle itself, rad; 0 where there is none but a speed's integral, whose errors are no noise of samples.
     pub(super) noise_rad: f64,
     /// By how much the instants of the logged angle jitter, s, where the speed is used for what is fast in its place.
     pub(super) jitter_s: Option<f64>,
@@ -45,6 +45,10 @@ impl Motion {
             let noise_rad = noise(angle);
             Self { noise_rad, ..of(angle.to_vec(), std::f64::consts::SQRT_2 * noise_rad / step_s) }
         };
+        let both = |speed_rad_s: &[f64], angle: &[f64]| {
+            let both = blended(speed_rad_s, angle, step_s);
+            Self { noise_rad: noise(&both), ..of(both, noise(speed_rad_s)) }
+        };
         match (speed, angle) {
             (None, None) => of(vec![0.0; grid.len()], 0.0),
             (Some(Speed { values_rad_s, .. }), None) => {
@@ -54,14 +58,14 @@ impl Motion {
             (Some(Speed { values_rad_s, lag_s }), Some(angle)) => {
                 let logged = logged(angle);
                 if *lag_s == 0.0 && noise(values_rad_s) < logged.slope_noise_rad_s {
-                    return of(blended(values_rad_s, angle, step_s), noise(values_rad_s));
+                    return both(values_rad_s, angle);
                 }
                 let jitter = noise::jitter(angle);
                 let usual_rad = rms(values_rad_s) * step_s;
                 if jitter * usual_rad > logged.noise_rad && lag_s.abs() < LATEST * step_s {
-                    let both = blended(&shifted(values_rad_s, lag_s / step_s), angle, step_s);
-                    if noise::jitter(&both) < 0.5 * jitter {
-                        return Self { jitter_s: Some(jitter * step_s), ..of(both, noise(values_rad_s)) };
+                    let both = both(&shifted(values_rad_s, lag_s / step_s), angle);
+                    if noise::jitter(&both.angle_rad) < 0.5 * jitter {
+                        return Self { jitter_s: Some(jitter * step_s), ..both };
                     }
                 }
                 logged
