@@ -3,8 +3,8 @@
 //! cov p = H⁻¹ S H⁻¹ (Huber 1967, White 1980) with H = Σ ψ′(r_t) j_t j_tᵀ, S = Σ_b s_b s_bᵀ and s_b = Σ_{t∈b} j_t ψ(r_t)
 //! summed over a block of neighbouring samples, as [`crate::fit::covariance`] does for least squares; ψ is the slope of
 //! Student's likelihood. The blocks see whatever noise of the inputs, error between samples or of the model's form is
-//! left in the residuals and is correlated over less than a block; S has that of noise that is slower besides
-//! ([`super::slow_noise`]), as far as it was not taken out of residuals and columns. The prior takes part in H alone, so that a
+//! left in the residuals and is correlated over less than a block; S has what noise that is slower adds from block to block
+//! besides ([`super::slow_noise`]), as far as it was not taken out of residuals and columns. The prior takes part in H alone, so that a
 //! number that the logs do not determine is as uncertain as the prior and no less.
 
 use std::borrow::Cow;

@@ -2,10 +2,10 @@
 //!
 //! The numbers of the friction curve make a ridge that is narrow and bent ([`super::fit_curve`]), so that a deviation at its top says
 //! little of its length. The likelihood is quadratic in what is seen, ln g at some speeds, whatever those numbers are: there it is
-//! taken from its slopes, as much wider as [`super::fit_interval`] finds the parameter less certain than independent samples would
-//! leave it (vertical scaling: R. E. Chandler and S. Bate, *Biometrika* 94, 2007). A parameter's interval ends where likelihood and
-//! prior, all other parameters at their best, have fallen by what 95 % ask for (Venzon and Moolgavkar 1988). That costs no pass
-//! over the logs.
+//! taken from its slopes, as much wider as [`super::fit_interval`] finds the way from the top to an end less certain than independent
+//! samples would leave it (vertical scaling: R. E. Chandler and S. Bate, *Biometrika* 94, 2007; along one way it takes no inverse
+//! of what forty blocks say of as many coordinates). A parameter's interval ends where likelihood and prior, all other parameters at
+//! their best, have fallen by what 95 % ask for (Venzon and Moolgavkar 1988). That costs no pass over the logs.
 //! Left out: errors that are alike at some of the speeds only.
 
 use nalgebra::{DMatrix, DVector};

@@ -1,12 +1,12 @@
-//! Do the 95 % intervals of `rig fit` hold the truth in 95 of 100 logs? Clean cases, the series element, a rig, a
-//! model file and a plan of its own for each.
+//! Do the 95 % intervals of `rig fit` hold the truth in 95 of 100 logs? Clean cases, a rig, a model file and a plan of its
+//! own for each.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::generate::generate;
-use crate::scenario::{Base, Scenario};
+use crate::scenario::Scenario;
 use crate::trial::run::Runner;
 use crate::trial::statistics::{Share, median};
 
@@ -62,7 +62,7 @@ impl Interval {
 /// Fits a clean case with this seed.
 #[must_use]
 pub fn fit(runner: &Runner, scenario: &Scenario, seed: u64) -> Fitted {
-    let scenario = Scenario { effects: Vec::new(), base: Base::Series, seed, ..scenario.clone() };
+    let scenario = Scenario { effects: Vec::new(), seed, ..scenario.clone() };
     let here = runner.folder.join(format!("fit-{seed}"));
     let mut stick_slip = false;
     let intervals = intervals(runner, &scenario, &here, &mut stick_slip);
