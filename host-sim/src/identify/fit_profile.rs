@@ -204,15 +204,17 @@ mod tests {
             (0..p.len()).for_each(|i| local[(i, i)] += baseline.free[i].parameter.sd.powi(-2));
             linear::factor(&local).inverse()[(2, 2)].sqrt()
         };
-        let of = |deviation: f64| {
+        let of = |deviation: f64, repeated: f64| {
             let covariance = DMatrix::from_diagonal_element(p.len(), p.len(), deviation * deviation);
             let logs = |q: &[f64]| DVector::from_vec(values(&model, &baseline, q, &free)).map(f64::ln);
             let known = Known { covariance, to_top: DVector::zeros(p.len()) };
             let told = Told::known(&baseline, &p, &known, slid()).unwrap();
+            let likely = Some(repeated * &told.covariance);
+            let told = Told { likely, ..told };
             let ends = profiles(told, (&p, &p), (0.0, 0.0, Form::BIAS_REMOVED), logs, &[deviation; 3]);
             (ends[2].0 - p[2], ends[2].1 - p[2])
         };
-        let (low, high) = of(0.02);
+        let (low, high) = of(0.02, 1.0);
         let half = INTERVAL_95 * straight(0.02);
         assert!(half > 0.04, "{half}");
         // The rest is the bend.
@@ -220,7 +222,12 @@ mod tests {
             (low / -half - 1.0).abs() < 0.1 && (high / half - 1.0).abs() < 0.1,
             "{low} {high} for {half}"
         );
-        let (low, high) = of(0.3);
+        // Samples of which four say what one would are known half as well.
+        let (wider_low, wider_high) = of(0.02, 4.0);
+        for ratio in [wider_low / low, wider_high / high] {
+            assert!((ratio / 2.0 - 1.0).abs() < 0.15, "{ratio}");
+        }
+        let (low, high) = of(0.3, 1.0);
         assert!(high > 0.3 && low < -0.3 && (high + low).abs() > 0.05, "{low} {high}");
     }
 }
