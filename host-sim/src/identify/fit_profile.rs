@@ -154,12 +154,13 @@ pub(super) fn profiles(
     let top = seen.at(p) + to_top;
     let of_form = DMatrix::from_diagonal(&of_form);
     let information = linear::factor(&covariance);
-    // Variance along the way between these values over what independent samples would leave.
+    // Variance along the way between these values over what independent samples would leave; a way that shows nowhere has its prior.
     let larger = |p: &[f64], q: &[f64]| {
         let way = seen.at(q) - seen.at(p);
         let along = information.solve(&way);
-        let own = way.dot(&along).max(f64::MIN_POSITIVE);
-        likely.as_ref().map_or(1.0, |likely| along.dot(&(likely * &along)) / own)
+        let own = way.dot(&along);
+        let likely = likely.as_ref().filter(|_| own > 0.0);
+        likely.map_or(1.0, |likely| along.dot(&(likely * &along)) / own)
     };
     let mut posterior = Posterior { seen: seen.clone(), top, spread: DMatrix::zeros(0, 0) };
     let mut ends = Vec::with_capacity(deviations.len());
