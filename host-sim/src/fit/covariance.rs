@@ -19,12 +19,14 @@ pub fn blocks_of(samples: usize) -> Vec<Range<usize>> {
     (0..blocks).map(|block| block * samples / blocks..(block + 1) * samples / blocks).collect()
 }
 
-/// Covariance of the parameters; `None` where JᵀJ cannot be inverted. `slow` makes the covariance of Jᵀr of that of blocks, where
-/// noise is slower than one.
+/// Makes the covariance of Jᵀr of these blocks' and the one that they show, where noise is slower than a block.
+pub type Slow<'a> = &'a dyn Fn(&[Range<usize>], DMatrix<f64>) -> DMatrix<f64>;
+
+/// Covariance of the parameters; `None` where JᵀJ cannot be inverted.
 pub fn sandwich(
     jacobian: &DMatrix<f64>,
     residual: &DVector<f64>,
-    slow: Option<&dyn Fn(DMatrix<f64>) -> DMatrix<f64>>,
+    slow: Option<Slow<'_>>,
 ) -> Option<DMatrix<f64>> {
     let (samples, parameters) = jacobian.shape();
     let blocks = blocks_of(samples);
@@ -48,7 +50,7 @@ pub fn sandwich(
         DMatrix::from_fn(parameters, parameters, |i, j| of_scaled[(i, j)] * (norms[i] * norms[j]).powi(back))
     };
     if let Some(slow) = slow {
-        spread = of_jacobian(&slow(of_jacobian(&spread, 1)), -1);
+        spread = of_jacobian(&slow(&blocks, of_jacobian(&spread, 1)), -1);
     }
     let covariance = &inverse * spread * &inverse;
     Some(of_jacobian(&covariance, -1))

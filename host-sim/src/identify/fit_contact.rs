@@ -232,9 +232,8 @@ pub fn identify(
         None
     } else {
         let likelihood = Likelihood::about(&problem, &fit);
-        let columns = likelihood.seen.slopes(&problem, &fit, &problem.predict(&[], &fit.p));
-        let likely =
-            Linearised::new(&problem, &fit, &columns).known(&likelihood.seen.held_within(), prior_sd.len());
+        let likely = Linearised::new(&problem, &fit, &likelihood.columns)
+            .known(&likelihood.seen.held_within(), prior_sd.len());
         let resimulated = Resimulated { model, rig, baseline: &baseline, free, raw };
         fit.p = resimulated.unbiased(&problem, (&found, &likelihood), progress)?;
         Some((likelihood, likely.covariance))

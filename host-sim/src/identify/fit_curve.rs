@@ -89,13 +89,6 @@ impl Seen<'_> {
         (0..self.speeds_m_s.len()).map(|i| here[i] - there[i]).collect()
     }
 
-    /// Columns −∂r/∂φ at a fit of the baseline.
-    pub(super) fn slopes(&self, problem: &Problem<'_>, fit: &Fit, prediction: &Prediction) -> Vec<Slope> {
-        let slopes = problem.slopes_of(fit);
-        let slip: Vec<f64> = prediction.observed.iter().flat_map(|o| o.slip_m_s.iter().copied()).collect();
-        self.columns(&slip, slopes.gain(), slopes.base())
-    }
-
     /// Deviations within which each coordinate is held where nothing shows it.
     pub(super) fn held_within(&self) -> Vec<f64> {
         let of_others = self.others().map(|i| HELD_WITHIN * self.baseline.free[i].parameter.sd);
@@ -183,6 +176,8 @@ pub(super) struct Likelihood<'a> {
     pub(super) to_top: DVector<f64>,
     /// Covariance, the samples taken for independent ones.
     pub(super) covariance: DMatrix<f64>,
+    /// Slopes −∂r/∂φ that it was taken from.
+    pub(super) columns: Vec<Slope>,
 }
 
 impl<'a> Likelihood<'a> {
@@ -193,20 +188,23 @@ impl<'a> Likelihood<'a> {
         // Where it slides at one speed, or one number of the curve is free, there is no ridge.
         let ridge = numbers_of_curve(baseline) > 1;
         let slid = ridge.then(|| speeds(slid_m_s(&prediction), SPEEDS, OUTSIDE)).flatten();
-        Self::of(Seen { baseline, speeds_m_s: slid.unwrap_or_default() }, problem, fit, &prediction)
+        Self::of(Seen { baseline, speeds_m_s: slid.unwrap_or_default() }, problem, fit, prediction)
     }
 
     /// The same in these coordinates.
     pub(super) fn seen(seen: Seen<'a>, problem: &Problem<'a>, fit: &Fit) -> Self {
-        Self::of(seen, problem, fit, &problem.predict(&[], &fit.p))
+        Self::of(seen, problem, fit, problem.predict(&[], &fit.p))
     }
 
-    fn of(seen: Seen<'a>, problem: &Problem<'a>, fit: &Fit, prediction: &Prediction) -> Self {
-        let columns = seen.slopes(problem, fit, prediction);
+    fn of(seen: Seen<'a>, problem: &Problem<'a>, fit: &Fit, prediction: Prediction) -> Self {
+        let slopes = problem.slopes_of(fit);
+        let slip = prediction.observed.into_iter().flat_map(|o| o.slip_m_s);
+        let columns = seen.columns(&slip.collect::<Vec<_>>(), slopes.gain(), slopes.base());
         let (mut h, g) = problem.normal_equations(&columns, &fit.r);
         seen.held_within().iter().enumerate().for_each(|(i, sd)| h[(i, i)] += sd.powi(-2));
         let factor = linear::factor(&h);
-        Self { at: seen.at(&fit.p), to_top: factor.solve(&g), covariance: factor.inverse(), seen }
+        let (to_top, covariance) = (factor.solve(&g), factor.inverse());
+        Self { at: seen.at(&fit.p), to_top, covariance, columns, seen }
     }
 
     /// Its top.

@@ -43,7 +43,7 @@ impl Form {
 const HELD: f64 = 0.01;
 /// A profile is followed so far, in ln: beyond a factor of e either way a parameter counts as not determined.
 const FARTHEST: f64 = 2.0;
-/// How often an end is sought with the uncertainty of the way to the last: where the ridge is bent that is another than at its top.
+/// How often an end is sought at most with the uncertainty of the way to the last: where the ridge is bent that is another than at its top.
 const ROUNDS: usize = 4;
 /// Points of a profile at most on either side: it is close to a straight line in the root of what it falls by.
 const POINTS: usize = 12;
@@ -172,7 +172,11 @@ pub(super) fn profiles(
                 posterior.spread = linear::factor(&(scale * &covariance + &of_form)).l();
                 let best = posterior.best(p, None);
                 ended = end(&posterior, &best, &of, *deviation, direction);
-                scale = larger(&best, &ended);
+                let next = larger(&best, &ended);
+                if next == scale {
+                    break;
+                }
+                scale = next;
             }
             of(&ended)
         };

@@ -11,6 +11,7 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::ops::Range;
 
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
@@ -25,7 +26,7 @@ use super::slow_noise::Errors;
 use crate::files::log::Log;
 use crate::files::model_file::{ModelFile, SOME_STEP_S};
 use crate::files::rig_file::RigFile;
-use crate::fit::covariance::{blocks_of, sandwich};
+use crate::fit::covariance::sandwich;
 use crate::input_error::InputError;
 use crate::least_squares::Problem;
 use crate::predict::curve::shifted;
@@ -86,7 +87,7 @@ impl SimulatedFit {
         let columns: Vec<Vec<f64>> =
             self.jacobian.column_iter().map(|c| c.iter().copied().collect()).collect();
         let errors = Errors { residual, deviation: &deviation, lengths: &self.lengths };
-        let slow = |within| errors.across_blocks(&columns, &blocks_of(residual.len()), within);
+        let slow = |blocks: &[Range<usize>], within| errors.across_blocks(&columns, blocks, within);
         let covariance = sandwich(&self.jacobian, &self.residual_nm, Some(&slow))?;
         let normal = factor(&(self.jacobian.transpose() * &self.jacobian));
         Some(Known { covariance, to_top: -normal.solve(&(self.jacobian.transpose() * &self.residual_nm)) })

@@ -260,7 +260,6 @@ mod tests {
             found += estimate * estimate / f64::from(TRIALS);
             stated += spread[(0, 0)] / norm / norm / f64::from(TRIALS);
         }
-        println!("{stated} for {found}");
         // A variance of 300 is known to 8 %.
         assert!((0.75..1.3).contains(&(stated / found)), "{stated} for {found}");
     }
