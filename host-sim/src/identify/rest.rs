@@ -178,17 +178,9 @@ fn beyond_noise(
     ((usual - left).max(0.0), left)
 }
 
-/// What lasts, or what single samples have beyond this noise, however rare they are, where that is more. What is rare is the tail of a
-/// cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
-fn or_rare(
-    lasting: (f64, f64),
-    residual: &[f64],
-    of_sample: &Noise,
-    rows: &[usize],
-    of_bridge: f64,
-) -> (f64, f64) {
-    let each = beyond_noise(residual, of_sample, rows, 1, of_bridge, 0.0);
-    if each.0 > lasting.0 { each } else { lasting }
+/// The larger of two rests, each with what noise leaves where it is measured.
+fn more(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    if b.0 > a.0 { b } else { a }
 }
 
 /// Samples in the blocks, the longest first.
@@ -266,9 +258,11 @@ impl Ground {
         self.beyond(&self.noise, residual)
     }
 
-    /// As [`or_rare`].
+    /// What lasts, or what single samples have beyond noise, however rare they are, where that is more. What is rare is the tail of a
+    /// cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
     fn or_rare(&self, lasting: (f64, f64), residual: &[f64]) -> (f64, f64) {
-        or_rare(lasting, residual, &self.of_sample, &self.rows, self.of_bridge[1])
+        let each = beyond_noise(residual, &self.of_sample, &self.rows, 1, self.of_bridge[1], 0.0);
+        more(lasting, each)
     }
 
     /// The same beyond this noise of blocks.
@@ -278,7 +272,7 @@ impl Ground {
         };
         let [long, short] = [0, 1].map(|at| of(noise, self.blocks[at], self.of_bridge[at]));
         let each = of(&self.of_sample, 1, self.of_bridge[1]);
-        [short, each].into_iter().fold(long, |most, other| if other.0 > most.0 { other } else { most })
+        [short, each].into_iter().fold(long, more)
     }
 
     /// What each cause of a fit does, from the fits without it. What is named of a block stays in both rests: where a transition
@@ -515,13 +509,15 @@ pub fn of_balance(
     let [block, _] = blocks(balance.row_step_s);
     let explained = none.map_or(0.0, |none| balance.difference(none, residual));
     let noise = Noise::white(balance.first_deviation.clone());
+    let of_row =
+        Noise::white(balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect());
+    // A row is a filter wide: what swings faster than a block lasts is structured from row to row.
     let of = |residual: &[f64]| {
         let lasting = structured(residual, &noise, &balance.used, block, of_bridge);
-        if causes > 0 {
-            return lasting;
-        }
-        let named = balance.first_deviation.iter().map(|deviation| NAMED_WITHIN * deviation).collect();
-        or_rare(lasting, residual, &Noise::white(named), &balance.used, of_bridge)
+        // What is rare is the tail of a cause's law; where nothing acts there is none.
+        let rare = if causes > 0 { RARE } else { 0.0 };
+        let each = beyond_noise(residual, &of_row, &balance.used, 1, of_bridge, rare);
+        more(lasting, each)
     };
     let (rest, left) = of(residual);
     let before = none.map_or(rest, |none| of(none).0);
@@ -636,6 +632,20 @@ mod tests {
         // 4 √(3/20 000), less the noise as far as it is known.
         assert!((rest(0).size - 0.049).abs() < 0.005, "{}", rest(0).size);
         assert!(rest(0).unknown() > 0.99 && rest(1).unknown() < 0.01);
+    }
+
+    #[test]
+    fn a_swing_that_a_block_averages_is_a_rest_of_a_linear_balance() {
+        // 20 Hz, whose period is a block's 50 ms; a cause explains a part of something slower.
+        const SWING: f64 = 0.05;
+        let balance = balance(0.0, 1.0);
+        let step_s = balance.row_step_s;
+        let swing: Vec<f64> =
+            (0..ROWS).map(|i| SWING * (std::f64::consts::TAU * 20.0 * step_s * i as f64).sin()).collect();
+        let without: Vec<f64> = swing.iter().map(|r| r + 0.02).collect();
+        let rest = of_balance(&balance, &swing, Some(&without), 1, 0.0, &[]);
+        assert!((rest.size - SWING / 2f64.sqrt()).abs() < 0.005, "{}", rest.size);
+        assert!(rest.unknown() > 0.9, "{}", rest.unknown());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::extended_model::Values;
 use super::holdout::{Errors, LogErrors};
 use super::judge::Judgement;
 use super::linear_part::Linear;
-use super::rest::{self, NAMED_WITHIN};
+use super::rest::{self, NAMED_WITHIN, Rest};
 use super::table::{Hypothesis, Part, TooSmall};
 use crate::files::effect_id::subsystem_of;
 
@@ -253,7 +253,8 @@ fn main_part(judged: &Judgement, causes: &[Cause]) -> Part {
     });
     let largest = || {
         let unknown = judged.rests.iter().max_by(|a, b| a.1.unknown().total_cmp(&b.1.unknown()));
-        unknown.filter(|(_, rest)| rest.unknown() > 0.5).map(|(part, _)| *part)
+        let tells = |rest: &Rest| judged.verdict() == "unknown" || rest.unknown() > 0.5;
+        unknown.filter(|(_, rest)| tells(rest)).map(|(part, _)| *part)
     };
     let first_part = judged.rests.first().map_or(Part::Friction, |(part, _)| *part);
     with_cause.or_else(largest).unwrap_or(first_part)
