@@ -15,7 +15,6 @@ use super::contact::search::{self, Ranked};
 use super::drive::DriveLog;
 use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales, TIME};
 use super::effects::{ContactView, LIBRARY};
-use super::evidence::overstated;
 use super::heard::{ChannelError, Heard, Teller};
 use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
 use super::linear;
@@ -232,12 +231,7 @@ impl ContactPart {
             let shaped = term.parameters.len() >= COLUMNS && term.parameters.iter().all(|p| p.amplitude);
             (term.effect, if shaped { SHAPE_FORM } else { LAW_FORM })
         };
-        // A cause that a few moments ask for is no surer than they are.
-        let problem = self.problem();
-        let likelihoods: Vec<Vec<f64>> =
-            self.ranked.par_iter().map(|ranked| problem.log_likelihoods(&ranked.fit)).collect();
         let of_set = |(place, (ranked, contributions)): (usize, (&Ranked, &Vec<Contribution>))| {
-            let log_evidence = ranked.log_evidence + overstated(&likelihoods[0], &likelihoods[place]);
             let terms = ranked.fit.terms.iter().map(of_term).zip(contributions);
             let effects: Vec<_> = terms.map(|((effect, form), own)| (effect, form, *own)).collect();
             let tells = [Part::Drive, Part::Pressure].map(|by| (by, self.told(by, place)));
@@ -246,12 +240,12 @@ impl ContactPart {
                 ..Candidate::new(place, log_evidence, effects.into_iter())
             };
             match &self.disc_cause {
-                None => vec![candidate(log_evidence, effects)],
+                None => vec![candidate(ranked.log_evidence, effects)],
                 Some(cause) => {
                     let own = (cause.effect, LAW_FORM, cause.contribution);
                     let with = effects.iter().copied().chain([own]).collect();
-                    let without = log_evidence - cause.lost;
-                    vec![candidate(log_evidence, with), candidate(without, effects)]
+                    let without = ranked.log_evidence - cause.lost;
+                    vec![candidate(ranked.log_evidence, with), candidate(without, effects)]
                 }
             }
         };

@@ -84,19 +84,6 @@ fn posterior(curvature: &DMatrix<f64>, share: f64, sd: &[f64]) -> Cholesky<f64, 
     }))
 }
 
-/// Nats by which a fit is less ahead of another one than their ln likelihoods, block after block, say. Their ratio Λ is a sum over
-/// blocks, and known to the deviation that these show (Q. H. Vuong, *Econometrica* 57, 1989). Where the likelihood is true its variance
-/// is 2 Λ; where a few blocks make it, it is more, and Λ counts as so much less.
-pub fn overstated(ahead: &[f64], behind: &[f64]) -> f64 {
-    let of_block: Vec<f64> = ahead.iter().zip(behind).map(|(a, b)| a - b).collect();
-    let (count, ratio) = (of_block.len() as f64, of_block.iter().sum::<f64>());
-    if count < 2.0 || ratio <= 0.0 {
-        return 0.0;
-    }
-    let variance = of_block.iter().map(|x| (x - ratio / count).powi(2)).sum::<f64>() * count / (count - 1.0);
-    ratio * (1.0 - (2.0 * ratio / variance.max(f64::MIN_POSITIVE)).min(1.0))
-}
-
 /// ln of the mean of exponentials.
 pub fn log_mean_exp(values: impl Iterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.collect();
@@ -107,39 +94,6 @@ pub fn log_mean_exp(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::noise::tests::white;
-
-    /// ln likelihoods of blocks whose samples have this mean, in deviations of their noise, by a fit that has it and by one that has none.
-    fn of_means(means: &[f64]) -> [Vec<f64>; 2] {
-        const LONG: usize = 50;
-        let noise = white(LONG * means.len(), 4);
-        let of = |known: f64| -> Vec<f64> {
-            let blocks = noise.chunks(LONG).zip(means);
-            let of_block = |(noise, mean): (&[f64], &f64)| -> f64 {
-                noise.iter().map(|n| -0.5 * (n + (1.0 - known) * mean).powi(2)).sum()
-            };
-            blocks.map(of_block).collect()
-        };
-        [of(1.0), of(0.0)]
-    }
-
-    #[test]
-    fn a_ratio_that_a_few_blocks_make_counts_as_less() {
-        let counts = |means: &[f64]| {
-            let [ahead, behind] = of_means(means);
-            let ratio: f64 = ahead.iter().zip(&behind).map(|(a, b)| a - b).sum();
-            assert_eq!(overstated(&behind, &ahead), 0.0);
-            [ratio, ratio - overstated(&ahead, &behind)]
-        };
-        // Some 50 nats, a little of each block: 40 blocks know a variance within 22 %.
-        let [ratio, counted] = counts(&[0.22; 40]);
-        assert!((35.0..65.0).contains(&ratio) && counted > 0.6 * ratio, "{ratio} {counted}");
-        // As many of one: no more is certain of its sign than of a single number that is as large as its deviation.
-        let mut one = [0.0; 40];
-        one[7] = 1.4;
-        let [ratio, counted] = counts(&one);
-        assert!((35.0..65.0).contains(&ratio) && (1.0..3.0).contains(&counted), "{ratio} {counted}");
-    }
 
     /// One parameter p ~ N(0, 1), misfit ½ h (p − y)²: with a share s the integral is known.
     #[test]

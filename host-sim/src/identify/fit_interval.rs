@@ -18,7 +18,7 @@ use super::slow_noise::Errors;
 use crate::fit::covariance::BLOCKS;
 
 /// Blocks of nearly equal length, none across two logs; `lengths` are those of the logs.
-pub(super) fn blocks(lengths: &[usize]) -> Vec<std::ops::Range<usize>> {
+fn blocks(lengths: &[usize]) -> Vec<std::ops::Range<usize>> {
     let all: usize = lengths.iter().sum();
     let mut from = 0;
     let mut blocks = Vec::new();

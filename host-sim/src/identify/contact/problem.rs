@@ -18,7 +18,6 @@ use super::observer::{Drive, Observed, SLIP_NOISES, observe};
 use super::struck_mode::innovations;
 use crate::identify::evidence::{CONTACT_SHARE, Expansion, TYPICAL_SCALE, covariance};
 use crate::identify::filters::{exponentials, rms};
-use crate::identify::fit_interval;
 use crate::identify::linear::{self, Slope, normal_equations_of};
 use crate::identify::term::{Column, Parameter, Starts};
 
@@ -799,17 +798,6 @@ impl<'a> Problem<'a> {
             curvature: &h,
         };
         [1.0, CONTACT_SHARE].map(|share| at.log_evidence(share, |_| 0.0))
-    }
-
-    /// ln likelihood of a fit with its share, block after block.
-    pub fn log_likelihoods(&self, fit: &Fit) -> Vec<f64> {
-        let new = self.noise.whitened(&fit.r);
-        let each = new.iter().zip(self.noise.counts()).map(|(r, counts)| counts * (r * r / FREEDOM).ln_1p());
-        let each: Vec<f64> = each.collect();
-        let lengths: Vec<usize> = self.logs.iter().map(ContactLog::len).collect();
-        let of_block = |block: std::ops::Range<usize>| -> f64 { each[block].iter().sum() };
-        let share = -0.5 * (FREEDOM + 1.0) * CONTACT_SHARE;
-        fit_interval::blocks(&lengths).into_iter().map(|block| share * of_block(block)).collect()
     }
 
     /// What a fit leaves open of its values, the likelihood with its share: their covariance.
