@@ -516,6 +516,26 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_unknown_is_described_where_it_is_largest() {
+        // A little more likely than not over all hypotheses; what this one leaves is a little less likely than that.
+        let of_drive =
+            Rest { size: 0.0132, share: 0.519, explained: 0.0235, times_noise: 196.0, ..Rest::default() };
+        assert!((0.4..0.5).contains(&of_drive.unknown()), "{}", of_drive.unknown());
+        let judged = Judgement {
+            contact: None,
+            drive: None,
+            normal_load: None,
+            hypotheses: Vec::new(),
+            too_small: Vec::new(),
+            unknown: 0.63,
+            rests: vec![(Part::Friction, Rest::default()), (Part::Drive, of_drive)],
+            notes: Vec::new(),
+            linear_stage: false,
+        };
+        assert_eq!(main_part(&judged, &[]), Part::Drive);
+    }
+
+    #[test]
     fn an_error_that_grows_is_not_said_to_fall() {
         assert_eq!(moves(0.052, 0.0031), "falls from 5.20 % to 0.31 %");
         assert_eq!(moves(0.0102, 0.0139), "rises from 1.02 % to 1.39 %");
