@@ -1,4 +1,4 @@
-//! What joins motor and disc: a spring, or a spring with play, and its numbers.
+//! What joins motor and disc, or the motor and the load of a linear stage: a spring, or a spring with play, and its numbers.
 //!
 //! Play: T_s = k x + d x′(φ) φ̇ over the twist φ, with the overlap
 //!
@@ -24,8 +24,8 @@ const HERTZ: [f64; 2] = [4.0, 150.0];
 const DAMPING_RATIO: [f64; 2] = [0.003, 0.5];
 /// Neither motor nor disc is all of the inertia.
 const DISC_SHARE: [f64; 2] = [0.1, 0.9];
-/// From the width of some counts of an encoder to a loose key's.
-const GAP_RAD: [f64; 2] = [1e-4, 0.3];
+/// From what only wobbles to a loose key's, in plays (`play`).
+const PLAYS: [f64; 2] = [0.025, 75.0];
 /// Play narrower than this share of the twist by the usual torque is none: the spring makes the motion.
 const LEAST_PLAY: f64 = 0.1;
 /// Share of a soft stage: less is play, more is one stage.
@@ -38,11 +38,41 @@ const MOST_BEND: f64 = 10.0;
 const BEND_SD: f64 = 0.5;
 const FIRST_BEND: f64 = 0.1;
 
-/// Names of the width of a dead zone and of a soft stage.
-const GAP: &str = "gap_rad";
-const SOFT_STAGE: &str = "soft_stage_rad";
+/// Names of a coupling's numbers: of a rotary drive's, and of a linear stage's.
+const STIFFNESS: Name = ["stiffness_nm_per_rad", "stiffness_n_per_m"];
+const DAMPING: Name = ["damping_nm_s_per_rad", "damping_n_s_per_m"];
+const DISC_INERTIA: Name = ["disc_inertia_kg_m2", "load_mass_kg"];
+const GAP: Name = ["gap_rad", "gap_m"];
+const SOFT_STAGE: Name = ["soft_stage_rad", "soft_stage_m"];
+const HARDENING: Name = ["hardening_per_rad2", "hardening_per_m2"];
 /// Name of the share of the bearing's torque that the disc bears.
 const BEARING_ON_DISC: &str = "bearing_on_disc_share";
+
+/// A number's name where the motion is a turn, and where it is a way.
+type Name = [&'static str; 2];
+
+/// What a coupling is part of.
+#[derive(Debug, Clone, Copy)]
+pub struct Machine {
+    /// Inertia or mass of motor and disc together.
+    pub inertia: f64,
+    /// Usual torque or force.
+    pub effort: f64,
+    /// Whether the motion is a turn.
+    pub rotary: bool,
+}
+
+impl Machine {
+    /// How far the usual effort moves all of the inertia while a mode in the middle of those that are looked for turns by 1 rad:
+    /// what play is measured in, since a machine that plays by much less does not feel it, whatever it is made of.
+    pub fn play(&self) -> f64 {
+        self.effort / (self.inertia * TAU * HERTZ[0] * TAU * HERTZ[1])
+    }
+
+    fn named(&self, name: Name) -> &'static str {
+        name[usize::from(!self.rotary)]
+    }
+}
 
 /// Numbers of a coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,8 +83,8 @@ pub struct Coupling {
     pub damping_ratio: f64,
     /// The disc's share of the inertia.
     pub disc_share: f64,
-    /// Width of the dead zone, or of the soft stage.
-    pub gap_rad: f64,
+    /// Width of the dead zone, or of the soft stage, rad or m.
+    pub gap: f64,
     /// How it bends, a ratio: without play by how much more than in proportion a spring takes at the twist that it would have
     /// under the usual torque, with play its rounding.
     pub bend: f64,
@@ -81,7 +111,7 @@ pub struct Law {
     damping: f64,
     rounding: f64,
     soft_share: f64,
-    hardening_per_rad2: f64,
+    hardening: f64,
 }
 
 impl Law {
@@ -114,7 +144,7 @@ impl Law {
     pub fn torque(&self, twist: f64, rate: f64) -> f64 {
         let (overlap, slope) = self.overlap(twist);
         let x = self.soft_share * twist + (1.0 - self.soft_share) * overlap;
-        let elastic = self.stiffness * x * (1.0 + self.hardening_per_rad2 * x * x);
+        let elastic = self.stiffness * x * (1.0 + self.hardening * x * x);
         if !self.is_play() {
             return elastic + self.damping * rate;
         }
@@ -136,7 +166,7 @@ impl Coupling {
             mode_hz,
             damping_ratio,
             disc_share,
-            gap_rad: 0.0,
+            gap: 0.0,
             bend: 0.0,
             soft_share: 0.0,
             bearing_on_disc: false,
@@ -154,12 +184,12 @@ impl Coupling {
     }
 
     /// Springs of two stages to begin with whose torque is about this one's at the usual torque.
-    pub fn in_stages(&self, inertia: f64, usual_torque: f64) -> Vec<Self> {
-        let twist = usual_torque / self.law(inertia, usual_torque).stiffness;
+    pub fn in_stages(&self, machine: &Machine) -> Vec<Self> {
+        let twist = machine.effort / self.law(machine).stiffness;
         // The second stage is the stiffer one: its mode is higher than that of both.
         let of = |share: f64| Self {
             mode_hz: 1.2 * self.mode_hz,
-            gap_rad: 2.0 * share * twist,
+            gap: 2.0 * share * twist,
             soft_share: 0.5,
             ..*self
         };
@@ -168,18 +198,18 @@ impl Coupling {
 
     /// Whether it has play.
     pub fn is_play(&self) -> bool {
-        self.gap_rad > 0.0 && self.soft_share == 0.0
+        self.gap > 0.0 && self.soft_share == 0.0
     }
 
-    /// Its law where motor and disc have this inertia together.
-    pub fn law(&self, inertia: f64, usual_torque: f64) -> Law {
+    /// Its law in this machine.
+    pub fn law(&self, machine: &Machine) -> Law {
         let omega = TAU * self.mode_hz;
-        let disc_inertia = self.disc_share * inertia;
+        let disc_inertia = self.disc_share * machine.inertia;
         let stiffness = disc_inertia * omega * omega;
-        let half_gap = 0.5 * self.gap_rad;
-        let hardening = if self.gap_rad > 0.0 { 0.0 } else { self.bend };
+        let half_gap = 0.5 * self.gap;
+        let hardening = if self.gap > 0.0 { 0.0 } else { self.bend };
         Law {
-            motor_inertia: inertia - disc_inertia,
+            motor_inertia: machine.inertia - disc_inertia,
             disc_inertia,
             omega_rad_s: omega,
             stiffness,
@@ -188,43 +218,45 @@ impl Coupling {
             damping: 2.0 * self.damping_ratio * disc_inertia * omega,
             rounding: if self.is_play() { self.bend } else { 0.0 },
             soft_share: self.soft_share,
-            hardening_per_rad2: hardening * (stiffness / usual_torque.max(1e-12)).powi(2),
+            hardening: hardening * (stiffness / machine.effort.max(1e-12)).powi(2),
         }
     }
 
-    /// Whether a coupling may have these numbers where motor and disc have this inertia together.
-    pub fn is_allowed(&self, inertia: f64, usual_torque: f64) -> bool {
-        let least_play = LEAST_PLAY * usual_torque / self.law(inertia, usual_torque).stiffness;
+    /// Whether a coupling of this machine may have these numbers.
+    pub fn is_allowed(&self, machine: &Machine) -> bool {
+        let least_play = LEAST_PLAY * machine.effort / self.law(machine).stiffness;
         let within = |[low, high]: [f64; 2], value: f64| (low..high).contains(&value);
         within(HERTZ, self.mode_hz)
             && within(DAMPING_RATIO, self.damping_ratio)
             && within(DISC_SHARE, self.disc_share)
-            && (self.gap_rad == 0.0 || within(GAP_RAD, self.gap_rad))
-            && (!self.is_play() || self.gap_rad >= least_play)
+            && (self.gap == 0.0 || within(PLAYS, self.gap / machine.play()))
+            && (!self.is_play() || self.gap >= least_play)
             && (self.soft_share == 0.0 || within(SOFT_SHARE, self.soft_share))
             && within([0.0, if self.is_play() { MOST_ROUNDING } else { MOST_BEND }], self.bend)
     }
 
     /// Which coupling, in words.
-    pub fn words(&self) -> String {
+    pub fn words(&self, machine: &Machine) -> String {
         let width = if self.soft_share > 0.0 { "soft stage" } else { "gap" };
-        format!("{:.0} Hz, {width} {:.2e} rad, bend {:.2}", self.mode_hz, self.gap_rad, self.bend)
+        let unit = if machine.rotary { "rad" } else { "m" };
+        format!("{:.0} Hz, {width} {:.2e} {unit}, bend {:.2}", self.mode_hz, self.gap, self.bend)
     }
 
-    /// Its law's numbers, with their names.
-    pub fn constants(&self, law: &Law) -> Vec<(String, f64)> {
+    /// Its law's numbers in this machine, with their names.
+    pub fn constants(&self, machine: &Machine) -> Vec<(String, f64)> {
+        let law = self.law(machine);
         let always = [
-            ("stiffness_nm_per_rad", law.stiffness),
-            ("damping_nm_s_per_rad", law.damping),
-            ("disc_inertia_kg_m2", law.disc_inertia),
+            (machine.named(STIFFNESS), law.stiffness),
+            (machine.named(DAMPING), law.damping),
+            (machine.named(DISC_INERTIA), law.disc_inertia),
             ("mode_hz", self.mode_hz),
         ];
-        let width = if self.is_play() { GAP } else { SOFT_STAGE };
+        let width = machine.named(if self.is_play() { GAP } else { SOFT_STAGE });
         let own = [
-            (width, self.gap_rad),
+            (width, self.gap),
             ("gap_rounding", law.rounding),
             ("soft_stage_share", self.soft_share),
-            ("hardening_per_rad2", law.hardening_per_rad2),
+            (machine.named(HARDENING), law.hardening),
             (BEARING_ON_DISC, law.bearing_on_disc),
         ];
         let own = own.into_iter().filter(|(_, value)| *value > 0.0);
@@ -232,16 +264,16 @@ impl Coupling {
     }
 
     /// The coupling that has these numbers.
-    pub fn of_constants(constants: &[(String, f64)], inertia: f64, usual_torque: f64) -> Self {
+    pub fn of_constants(constants: &[(String, f64)], machine: &Machine) -> Self {
         let get = |name: &str| constants.iter().find(|(key, _)| key == name).map_or(0.0, |(_, value)| *value);
-        let (stiffness, mode_hz) = (get("stiffness_nm_per_rad"), get("mode_hz"));
-        let hardening = get("hardening_per_rad2") * (usual_torque / stiffness.max(1e-12)).powi(2);
+        let of = |name: Name| get(machine.named(name));
+        let (stiffness, mode_hz) = (of(STIFFNESS), get("mode_hz"));
+        let hardening = of(HARDENING) * (machine.effort / stiffness.max(1e-12)).powi(2);
         Self {
             mode_hz,
-            damping_ratio: get("damping_nm_s_per_rad") * std::f64::consts::PI * mode_hz
-                / stiffness.max(1e-12),
-            disc_share: get("disc_inertia_kg_m2") / inertia,
-            gap_rad: get(GAP).max(get(SOFT_STAGE)),
+            damping_ratio: of(DAMPING) * std::f64::consts::PI * mode_hz / stiffness.max(1e-12),
+            disc_share: of(DISC_INERTIA) / machine.inertia,
+            gap: of(GAP).max(of(SOFT_STAGE)),
             bend: get("gap_rounding").max(hardening),
             soft_share: get("soft_stage_share"),
             bearing_on_disc: get(BEARING_ON_DISC) > 0.0,
@@ -251,7 +283,7 @@ impl Coupling {
     /// What is fitted: logarithms, so that a step is a ratio, and what is a ratio.
     pub fn fitted(&self) -> Vec<f64> {
         let always = [self.mode_hz, self.damping_ratio, self.disc_share].map(f64::ln);
-        let gap = (self.gap_rad > 0.0).then(|| self.gap_rad.ln());
+        let gap = (self.gap > 0.0).then(|| self.gap.ln());
         let ratios = [self.bend, self.soft_share].into_iter().filter(|ratio| *ratio > 0.0);
         always.into_iter().chain(gap).chain(ratios).collect()
     }
@@ -264,7 +296,7 @@ impl Coupling {
             mode_hz: p[0].exp(),
             damping_ratio: p[1].exp(),
             disc_share: p[2].exp(),
-            gap_rad: if self.gap_rad > 0.0 { own(true).exp() } else { 0.0 },
+            gap: if self.gap > 0.0 { own(true).exp() } else { 0.0 },
             bend: own(self.bend > 0.0),
             soft_share: own(self.soft_share > 0.0),
             bearing_on_disc: self.bearing_on_disc,
@@ -276,7 +308,7 @@ impl Coupling {
     pub fn log_occam(&self, curvature: &DMatrix<f64>) -> f64 {
         let even = |[low, high]: [f64; 2]| (high / low).ln() / 12f64.sqrt();
         let always = [even(HERTZ), even(DAMPING_RATIO), even(DISC_SHARE)];
-        let gap = (self.gap_rad > 0.0).then(|| even(GAP_RAD));
+        let gap = (self.gap > 0.0).then(|| even(PLAYS));
         let bend = (self.bend > 0.0).then_some(BEND_SD);
         let soft = (self.soft_share > 0.0).then(|| 12f64.sqrt().recip());
         let sd: Vec<f64> = always.into_iter().chain(gap).chain(bend).chain(soft).collect();
@@ -290,41 +322,50 @@ mod tests {
 
     const USUAL_NM: f64 = 2.0;
 
+    fn of_inertia(inertia: f64) -> Machine {
+        Machine { inertia, effort: USUAL_NM, rotary: true }
+    }
+
     fn play(bend: f64) -> Coupling {
-        Coupling { gap_rad: 0.02, bend, ..Coupling::spring(50.0, 0.05, 0.6) }
+        Coupling { gap: 0.02, bend, ..Coupling::spring(50.0, 0.05, 0.6) }
     }
 
     #[test]
     fn its_constants_tell_all_of_it() {
-        let spring = Coupling::spring(20.0, 0.1, 0.5);
-        let stages = spring.in_stages(0.6, USUAL_NM)[0];
-        for coupling in [spring, spring.bent(), stages, play(0.0), play(0.7)] {
-            let constants = coupling.constants(&coupling.law(0.6, USUAL_NM));
-            let told = Coupling::of_constants(&constants, 0.6, USUAL_NM);
-            let (told, own) = (told.fitted(), coupling.fitted());
-            assert_eq!(told.len(), own.len());
-            assert!(told.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-9), "{told:?} {own:?}");
-            assert_eq!(coupling.with(&own).fitted(), own);
-            assert!(coupling.is_allowed(0.6, USUAL_NM));
+        for rotary in [true, false] {
+            let machine = Machine { rotary, ..of_inertia(0.02) };
+            let spring = Coupling::spring(20.0, 0.1, 0.5);
+            let stages = spring.in_stages(&machine)[0];
+            for coupling in [spring, spring.bent(), stages, play(0.0), play(0.7)] {
+                let constants = coupling.constants(&machine);
+                let of_turn = |name: &str| ["nm", "_rad", "kg_m2"].iter().any(|unit| name.contains(unit));
+                assert_eq!(constants.iter().any(|(name, _)| of_turn(name)), rotary, "{constants:?}");
+                let told = Coupling::of_constants(&constants, &machine);
+                let (told, own) = (told.fitted(), coupling.fitted());
+                assert_eq!(told.len(), own.len());
+                assert!(told.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-9), "{told:?} {own:?}");
+                assert_eq!(coupling.with(&own).fitted(), own);
+                assert!(coupling.is_allowed(&machine));
+            }
         }
     }
 
     #[test]
     fn play_that_a_stiff_torque_does_not_feel_is_none() {
         // The twist by the usual torque is 0.0338 rad.
-        let of_gap = |gap_rad| Coupling { gap_rad, ..Coupling::spring(10.0, 0.05, 0.5) };
-        let twist = USUAL_NM / of_gap(0.01).law(0.03, USUAL_NM).stiffness;
+        let of_gap = |gap| Coupling { gap, ..Coupling::spring(10.0, 0.05, 0.5) };
+        let twist = USUAL_NM / of_gap(0.01).law(&of_inertia(0.03)).stiffness;
         for (share, allowed) in [(0.05, false), (0.2, true)] {
-            assert_eq!(of_gap(share * twist).is_allowed(0.03, USUAL_NM), allowed, "{share}");
+            assert_eq!(of_gap(share * twist).is_allowed(&of_inertia(0.03)), allowed, "{share}");
         }
         // A soft stage is a spring's.
-        assert!(Coupling { soft_share: 0.5, ..of_gap(0.05 * twist) }.is_allowed(0.03, USUAL_NM));
+        assert!(Coupling { soft_share: 0.5, ..of_gap(0.05 * twist) }.is_allowed(&of_inertia(0.03)));
     }
 
     #[test]
     fn a_spring_that_hardens_takes_its_bend_more_at_the_usual_torque() {
         let spring = Coupling { bend: 0.3, ..Coupling::spring(20.0, 0.1, 0.5) };
-        let law = spring.law(0.02, USUAL_NM);
+        let law = spring.law(&of_inertia(0.02));
         let twist = USUAL_NM / law.stiffness;
         assert!((law.torque(twist, 0.0) - 1.3 * USUAL_NM).abs() < 1e-9);
         assert!((law.torque(-twist, 0.0) + 1.3 * USUAL_NM).abs() < 1e-9);
@@ -332,8 +373,8 @@ mod tests {
 
     #[test]
     fn a_spring_of_two_stages_is_soft_and_then_stiff() {
-        let stages = Coupling { gap_rad: 0.02, soft_share: 0.4, ..Coupling::spring(20.0, 0.1, 0.5) };
-        let law = stages.law(0.02, USUAL_NM);
+        let stages = Coupling { gap: 0.02, soft_share: 0.4, ..Coupling::spring(20.0, 0.1, 0.5) };
+        let law = stages.law(&of_inertia(0.02));
         assert!((law.torque(0.005, 0.0) / law.stiffness - 0.4 * 0.005).abs() < 1e-12);
         assert!((law.torque(-0.03, 0.0) / law.stiffness + 0.4 * 0.03 + 0.6 * 0.02).abs() < 1e-12);
         // It is a spring: it drags in its middle, and pulls.
@@ -342,7 +383,7 @@ mod tests {
 
     #[test]
     fn rounded_play_is_the_dead_zone_far_from_its_ends_and_carries_nothing_in_its_middle() {
-        let [sharp, round] = [play(0.0), play(0.5)].map(|coupling| coupling.law(0.02, USUAL_NM));
+        let [sharp, round] = [play(0.0), play(0.5)].map(|coupling| coupling.law(&of_inertia(0.02)));
         assert_eq!([sharp.torque(0.009, 1.0), sharp.torque(-0.009, -1.0)], [0.0, 0.0]);
         assert!((sharp.torque(0.03, 0.0) - 0.02 * sharp.stiffness).abs() < 1e-9);
         assert!((round.torque(0.5, 0.0) / sharp.torque(0.5, 0.0) - 1.0).abs() < 1e-3);
@@ -350,7 +391,7 @@ mod tests {
         // Nothing pulls.
         assert_eq!(sharp.torque(0.0101, -100.0), 0.0);
         for rounding in [0.02, 0.2, 0.5, 1.0] {
-            let law = play(rounding).law(0.02, USUAL_NM);
+            let law = play(rounding).law(&of_inertia(0.02));
             for twist in [-0.03, -0.01001, 0.004, 0.00999, 0.011, 3.0] {
                 let slope = (law.overlap(twist + 1e-7).0 - law.overlap(twist - 1e-7).0) / 2e-7;
                 assert!((law.slope(twist) - slope).abs() < 1e-3, "{twist}: {} {slope}", law.slope(twist));

@@ -1,4 +1,5 @@
-//! Motor and disc apart: the disc behind a coupling (`coupling.rs`), turned by the measured motion of the motor.
+//! Motor and disc apart: the disc behind a coupling (`coupling.rs`), turned by the measured motion of the motor; in a linear stage
+//! the load, pushed by it.
 //!
 //! J_d ω̇_d = T_s(θ_m − θ_d, ω_m − ω_d) − T_f − s bearing,   T2 = J_m ω̇_m + (1 − s) bearing + T_s
 //!
@@ -11,7 +12,7 @@ use rayon::prelude::*;
 
 use super::balance::{Alternative, Balance, DiscMotion, Weighed};
 use super::contact::problem::{KEPT_PROMISE, MENDED_PROMISE, UNDECIDED, student_weight};
-use super::coupling::{Coupling, Law};
+use super::coupling::{Coupling, Law, Machine};
 use super::drive::{Bearing, DriveLog, INERTIA};
 use super::effects::DriveView;
 use super::evidence::BALANCE_SHARE;
@@ -141,6 +142,11 @@ fn between([x0, x1]: [f64; 2], [m0, m1]: [f64; 2], part: f64) -> (f64, f64) {
     (x0 + part * (m0 + part * (turn + part * bow)), m0 + part * (2.0 * turn + 3.0 * part * bow))
 }
 
+/// What a coupling of this drive is part of.
+pub fn machine(view: &DriveView<'_>) -> Machine {
+    Machine { inertia: view.inertia, effort: view.scales.effort, rotary: view.rotary }
+}
+
 fn alternative(
     effect: &'static str,
     view: &DriveView<'_>,
@@ -149,10 +155,11 @@ fn alternative(
     pull: f64,
 ) -> Option<Alternative> {
     let n = numbers;
-    if !n.is_allowed(view.inertia, view.scales.effort) {
+    let machine = machine(view);
+    if !n.is_allowed(&machine) {
         return None;
     }
-    let law = n.law(view.inertia, view.scales.effort);
+    let law = n.law(&machine);
     let mut added = Vec::with_capacity(view.balance.response.len());
     for (log, from) in with_starts(view.logs) {
         let (torque, _) = shaft_torque((log, from), 0.0, &law, bearing, pull);
@@ -173,11 +180,11 @@ fn alternative(
         added.extend(log.filtered(&change));
     }
     Some(Alternative {
-        form: n.words(),
+        form: n.words(&machine),
         response: Some(added),
         disc: Some(DiscMotion { angle_rad: Vec::new(), angle_per_unit: Vec::new() }),
         base_shift: vec![(INERTIA, -law.disc_inertia)],
-        constants: n.constants(&law),
+        constants: n.constants(&machine),
         ..Alternative::columns(effect, Vec::<Parameter>::new(), Vec::new())
     })
 }
@@ -191,7 +198,7 @@ pub fn alternatives_of_grid(
 ) -> Vec<Alternative> {
     // There is one coupling.
     let coupled = view.company.forms.iter().any(|form| form.is_coupling());
-    if !view.rotary || view.inertia <= 0.0 || coupled {
+    if view.inertia <= 0.0 || coupled {
         return Vec::new();
     }
     match view.fixed {
@@ -202,7 +209,7 @@ pub fn alternatives_of_grid(
 
 /// The coupling with the numbers that were found on other logs.
 fn of_constants(effect: &'static str, view: &DriveView<'_>, fixed: &[(String, f64)]) -> Option<Alternative> {
-    let numbers = Coupling::of_constants(fixed, view.inertia, view.scales.effort);
+    let numbers = Coupling::of_constants(fixed, &machine(view));
     stated(effect, view, &numbers, view.bearing?)
 }
 
@@ -215,7 +222,7 @@ fn stated(
 ) -> Option<Alternative> {
     let pull = judged(numbers, &view.logs[0]);
     let form = alternative(effect, view, numbers, bearing, pull)?;
-    let law = numbers.law(view.inertia, view.scales.effort);
+    let law = numbers.law(&machine(view));
     let noise_variance = noise_variance(view, &law, bearing, pull);
     Some(reckoned(view, &law, bearing, Alternative { noise_variance, ..form }))
 }
@@ -273,8 +280,8 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> 
     // Of each width the best, so that the fits do not all start in one valley.
     let mut widths: Vec<f64> = Vec::new();
     of_grid.retain(|t| {
-        let new = t.numbers.gap_rad == 0.0 || !widths.contains(&t.numbers.gap_rad);
-        widths.push(t.numbers.gap_rad);
+        let new = t.numbers.gap == 0.0 || !widths.contains(&t.numbers.gap);
+        widths.push(t.numbers.gap);
         new
     });
     let of_grid: Vec<Coupling> = of_grid.iter().map(|t| t.numbers).take(2 * STARTS).collect();
@@ -289,7 +296,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> 
     let staged = if plain.0.numbers.is_play() {
         None
     } else {
-        let stages = plain.0.numbers.in_stages(view.inertia, view.scales.effort);
+        let stages = plain.0.numbers.in_stages(&machine(view));
         best_of(tried(stages), &bearing)
     };
     // What bends a little is near what does not.
@@ -360,7 +367,7 @@ fn refined(
     trial: impl Fn(&Coupling, &[f64]) -> Option<Trial>,
     glance: impl Fn(&Coupling, &[f64]) -> Option<Vec<f64>> + Sync,
 ) -> Option<(Trial, f64)> {
-    let step = if start.numbers.gap_rad > 0.0 { STEP_OVER_PLAY } else { STEP };
+    let step = if start.numbers.gap > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
     let mut log_occam = None;
     let mut damping = 1e-2;
@@ -486,6 +493,10 @@ pub(super) mod tests {
         )
     }
 
+    fn of_effort(effort: f64) -> Machine {
+        Machine { inertia: INERTIA_KG_M2, effort, rotary: true }
+    }
+
     /// What a form is looked for in: logs of a rotary drive, with nothing found yet.
     fn view<'a>(
         logs: &'a [DriveLog],
@@ -507,11 +518,21 @@ pub(super) mod tests {
 
     /// Numbers of the best form.
     fn found(effect: &'static str, log: DriveLog, grid: &[Coupling]) -> Vec<(String, f64)> {
+        found_in((true, INERTIA_KG_M2), effect, log, grid)
+    }
+
+    /// The same in a drive that turns or goes to and fro, of this inertia or mass.
+    fn found_in(
+        (rotary, inertia): (bool, f64),
+        effect: &'static str,
+        log: DriveLog,
+        grid: &[Coupling],
+    ) -> Vec<(String, f64)> {
         let logs = [log];
         let scales = DriveScales::new(&logs);
         let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
         let residual = balance.solve(&[], &[]).residual;
-        let view = view(&logs, &scales, &balance, &residual);
+        let view = DriveView { rotary, inertia, ..view(&logs, &scales, &balance, &residual) };
         let forms = searched(effect, &view, grid.to_vec()).into_iter();
         let best = forms.max_by(|a, b| {
             let evidence = |form: &Alternative| balance.solve_forms(&[form]).log_evidence;
@@ -555,7 +576,7 @@ pub(super) mod tests {
         let scales = DriveScales::new(&logs);
         let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
         let spring = Coupling { bearing_on_disc: true, ..Coupling::spring(9.6, 0.04, 0.61) };
-        let law = spring.law(INERTIA_KG_M2, scales.effort);
+        let law = spring.law(&of_effort(scales.effort));
         let left = |coulomb_nm: f64| {
             // The torque is the same; how much of it follows the disc's speed is not.
             let torque_nm = drive::direction(&logs[0], scales.speed).iter().map(|s| coulomb * s).collect();
@@ -584,18 +605,48 @@ pub(super) mod tests {
         assert_near(&found, "soft_stage_rad", 2.0 * half, 0.1);
     }
 
-    #[test]
-    fn play_is_found_with_its_width() {
-        let (k, gap, d) = (1100.0, 0.02, 0.5);
-        let log = swinging_disc(|twist: f64, rate| {
+    /// A log whose disc has this play.
+    fn with_play(gap: f64) -> DriveLog {
+        let (k, d) = (1100.0, 0.5);
+        swinging_disc(|twist: f64, rate| {
             let overlap = (twist.abs() - 0.5 * gap).max(0.0) * twist.signum();
             let carried = k * overlap + d * rate;
             if overlap * carried > 0.0 { carried } else { 0.0 }
-        });
-        let of = |gap_rad| Coupling { gap_rad, ..Coupling::spring(48.0, 0.05, 0.55) };
-        let found = found("backlash", log, &[0.006, 0.012, 0.025, 0.05].map(of));
+        })
+    }
+
+    fn plays(widths: [f64; 4]) -> [Coupling; 4] {
+        widths.map(|gap| Coupling { gap, ..Coupling::spring(48.0, 0.05, 0.55) })
+    }
+
+    #[test]
+    fn play_is_found_with_its_width() {
+        let gap = 0.02;
+        let found = found("backlash", with_play(gap), &plays([0.006, 0.012, 0.025, 0.05]));
         // Stiffness and damping of blows that last some samples are not.
         assert_near(&found, "gap_rad", gap, 0.05);
+    }
+
+    #[test]
+    fn a_stage_that_a_turn_of_some_lead_moves_has_the_same_play() {
+        const LEAD_M: f64 = 2.5e-3 / std::f64::consts::TAU;
+        const GAP_RAD: f64 = 0.02;
+        let turned = with_play(GAP_RAD);
+        let times = |values: &[f64], by: f64| values.iter().map(|x| x * by).collect::<Vec<f64>>();
+        let mass = INERTIA_KG_M2 / (LEAD_M * LEAD_M);
+        let moved = DriveLog::made(
+            "log".into(),
+            turned.grid.clone(),
+            times(&turned.effort, LEAD_M.recip()),
+            times(&turned.position, LEAD_M),
+            turned.friction.map(|friction| times(&friction, LEAD_M.recip())),
+            turned.load_n,
+            turned.usable,
+            mass,
+        );
+        let grid = plays([0.006, 0.012, 0.025, 0.05].map(|gap| gap * LEAD_M));
+        let found = found_in((false, mass), "backlash", moved, &grid);
+        assert_near(&found, "gap_m", GAP_RAD * LEAD_M, 0.05);
     }
 
     /// Deviation that the sensors' noise leaves behind a coupling at each point of its log, beyond the bridge's in the balance.
@@ -605,7 +656,7 @@ pub(super) mod tests {
         let balance = drive::balance(&logs, &DrivePrior::default(), &scales);
         let bearing = Bearing::new(vec![0.0; balance.response.len()], &[0.0; 3], &scales);
         let view = view(&logs, &scales, &balance, &[]);
-        let law = numbers.law(INERTIA_KG_M2, scales.effort);
+        let law = numbers.law(&of_effort(scales.effort));
         noise_variance(&view, &law, &bearing, pull).iter().map(|v| v.sqrt()).collect()
     }
 
@@ -638,12 +689,7 @@ pub(super) mod tests {
     #[test]
     fn where_the_disc_lies_in_its_play_is_not_known_before_the_first_blow() {
         let (k, gap, d) = (1100.0, 0.02, 0.5);
-        let log = swinging_disc(|twist: f64, rate| {
-            let overlap = (twist.abs() - 0.5 * gap).max(0.0) * twist.signum();
-            let carried = k * overlap + d * rate;
-            if overlap * carried > 0.0 { carried } else { 0.0 }
-        });
-        let noise = noise_behind(log, &Coupling { gap_rad: gap, ..coupling(k, d) }, PULL);
+        let noise = noise_behind(with_play(gap), &Coupling { gap, ..coupling(k, d) }, PULL);
         let usual = filters::rms(&noise);
         let first_blow = noise[..noise.len() / 16].iter().copied().fold(0.0, f64::max);
         assert!(first_blow > 5.0 * usual, "{first_blow} {usual}");
@@ -661,7 +707,7 @@ pub(super) mod tests {
             let disc_share = DISC_KG_M2 / INERTIA_KG_M2;
             let spring = Coupling::spring(omega / std::f64::consts::TAU, damping_ratio, disc_share);
             let numbers = Coupling { bearing_on_disc, ..spring };
-            let constants = numbers.constants(&numbers.law(INERTIA_KG_M2, scales.effort));
+            let constants = numbers.constants(&of_effort(scales.effort));
             let viscous: Vec<f64> = logs[0].speed.iter().map(|w| 0.02 * w).collect();
             let residual = balance.solve(&[], &[]).residual;
             let told = Bearing::new(viscous.clone(), &[0.0, 0.0, 0.02], &scales);

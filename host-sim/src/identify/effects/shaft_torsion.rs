@@ -1,4 +1,4 @@
-//! `shaft_torsion`: disc and motor are coupled by a torsional spring: a two-mass resonance.
+//! `shaft_torsion`: motor and disc, or motor and load, are coupled by a spring: a two-mass resonance.
 
 use super::{About, DriveView, Effect};
 use crate::identify::balance::Alternative;
@@ -12,7 +12,7 @@ impl Effect for ShaftTorsion {
     fn about(&self) -> About {
         About {
             id: "shaft_torsion",
-            meaning: "disc and motor are coupled by a torsional spring",
+            meaning: "motor and disc, or motor and load, are coupled by a spring",
             experiment: "drive the lifted disc with a torque sweep from 2 to 100 Hz",
         }
     }
