@@ -10,11 +10,12 @@ use super::contact::baseline;
 use super::contact::change::{Change, ContactTerm};
 use super::contact::channel::{before_ringing, error_nm, normal_error_n};
 use super::contact::log::ContactLog;
-use super::contact::problem::{Baseline, Fit, Noise, Numbers, Problem};
+use super::contact::problem::{Baseline, Fit, Noise, Numbers, PredictionErrors, Problem};
 use super::contact::search::{self, Ranked};
 use super::drive::DriveLog;
 use super::effects::coordinates::{Coordinates, HEAT_TIMES_S, Scales, TIME};
 use super::effects::{ContactView, LIBRARY};
+use super::filters::rms;
 use super::heard::{ChannelError, Heard, Teller};
 use super::law_form::{COLUMNS, LAW_FORM, SHAPE_FORM};
 use super::linear;
@@ -65,6 +66,8 @@ pub struct DiscCause {
     pub effect: &'static str,
     /// Residuals of the baseline with the motion as logged, N m.
     pub residual_nm: Vec<f64>,
+    /// Errors of what that predicts.
+    pub errors_as_logged: PredictionErrors,
     /// What it does in the contact: to the baseline.
     pub contribution: Contribution,
     /// ln evidence that the contact loses with the motion as logged.
@@ -75,14 +78,14 @@ impl DiscCause {
     /// A cause that parts the disc's motion from the encoder's, which stands in `logged`, with what that does to a baseline that was
     /// fitted with the disc's.
     fn new(parted: Parted, logged: &[ContactLog], problem: &Problem<'_>, ranked: &[Ranked]) -> Self {
-        let Parted { effect, way, residual_nm } = parted;
+        let Parted { effect, way, as_logged: (residual_nm, errors_as_logged) } = parted;
         let as_logged = Problem::with_noise(logged, problem.baseline, &[], problem.noise.clone());
         let left = search::baseline(&as_logged);
         // The baseline is always among the sets.
         let none = ranked.iter().find(|r| r.fit.terms.is_empty()).unwrap_or(&ranked[0]);
         let contribution = Ground::new(problem, &ranked[0].fit).of_motion(problem, &none.fit, &left);
         let lost = (none.log_evidence - as_logged.log_evidence(&left)[1]).max(0.0);
-        Self { way, effect, residual_nm, contribution, lost }
+        Self { way, effect, residual_nm, errors_as_logged, contribution, lost }
     }
 }
 
@@ -90,7 +93,7 @@ impl DiscCause {
 struct Parted {
     effect: &'static str,
     way: [usize; 2],
-    residual_nm: Vec<f64>,
+    as_logged: (Vec<f64>, PredictionErrors),
 }
 
 impl ContactPart {
@@ -348,15 +351,15 @@ fn with_disc_motion(
         following(&logs, forms)
     });
     let Some((effect, ways)) = parted else { return (logs, None) };
-    let (residual_nm, as_logged) = left_by_baseline(&logs, baseline);
+    let as_logged = left_by_baseline(&logs, baseline);
     let mut left: Vec<(usize, f64)> =
-        ways.par_iter().map(|logs| left_by_baseline(logs, baseline).1).enumerate().collect();
+        ways.par_iter().map(|logs| rms(&left_by_baseline(logs, baseline).0)).enumerate().collect();
     left.sort_by(|a, b| a.1.total_cmp(&b.1));
-    if left[0].1 >= as_logged {
+    if left[0].1 >= rms(&as_logged.0) {
         return (logs, None);
     }
     let way = [left[0].0, left.get(1).unwrap_or(&left[0]).0];
-    (known_by(&ways, way), Some(Parted { effect, way, residual_nm }))
+    (known_by(&ways, way), Some(Parted { effect, way, as_logged }))
 }
 
 /// The fit of the set that is the likeliest with its prior and in which no cause is too small to be told: a channel has an end
@@ -416,15 +419,12 @@ pub fn known_by(ways: &[Vec<ContactLog>], [best, next]: [usize; 2]) -> Vec<Conta
     ways[best].iter().zip(&ways[next]).map(|(log, other)| log.known_as_well_as(other)).collect()
 }
 
-/// What the baseline leaves of these logs with a noise model of its own, N m, and its mean square, (N m)².
-fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, f64) {
+/// What the baseline leaves of these logs with a noise model of its own, N m, and the errors of what it predicts.
+fn left_by_baseline(logs: &[ContactLog], baseline: &Baseline) -> (Vec<f64>, PredictionErrors) {
     let problem = Problem::new(logs, baseline, &[]);
-    let residual_nm: Vec<f64> = {
-        let r = search::baseline(&problem).r;
-        r.iter().zip(&problem.noise.deviation).map(|(r, s)| r * s).collect()
-    };
-    let square = residual_nm.iter().map(|r| r * r).sum::<f64>() / residual_nm.len().max(1) as f64;
-    (residual_nm, square)
+    let fit = search::baseline(&problem);
+    let residual_nm = fit.r.iter().zip(&problem.noise.deviation).map(|(r, s)| r * s).collect();
+    (residual_nm, PredictionErrors::new(&problem, &fit))
 }
 
 /// Coordinates of the contact with their units, all logs on end: what residuals are drawn over.
@@ -566,7 +566,7 @@ mod tests {
             let angle_rad: Vec<f64> =
                 logs[0].angle_rad.iter().enumerate().map(|(i, angle)| angle + swing(i)).collect();
             let logged = [logs[0].following(&angle_rad)];
-            let parted = Parted { effect: "shaft_torsion", way: [0, 1], residual_nm: Vec::new() };
+            let parted = Parted { effect: "shaft_torsion", way: [0, 1], as_logged: Default::default() };
             DiscCause::new(parted, &logged, &problem, &ranked)
         };
         let [still, swings] = [cause(0.0), cause(0.05)];

@@ -179,12 +179,12 @@ fn contact_errors(
     problem.noise = problem.noise_at(&own_terms, &fit.p);
     let logged = Problem::with_noise(as_logged, &contact.baseline, &terms, problem.noise.clone());
     let predicted = problem.predict(&own_terms, &fit.p);
-    let base = contact_left(&logged, &logged.predict(&none.terms, &none.p));
-    let extended = contact_left(&problem, &predicted);
+    let base = logged.left(&logged.predict(&none.terms, &none.p));
+    let extended = problem.left(&predicted);
     let noise = contact_noise(contact, fit, &problem, &predicted);
     let mut errors = Errors::default();
     let measured: Vec<f64> = problem.measured().collect();
-    let mut known = known_samples(&problem).into_iter().peekable();
+    let mut known = problem.compared().into_iter().peekable();
     let mut ends = 0;
     for log in logs {
         ends += log.len();
@@ -195,20 +195,6 @@ fn contact_errors(
         errors.add(&log.source, &points, log.grid.step_s);
     }
     errors
-}
-
-/// What a contact leaves, N m, but for what it was seen to swing with.
-fn contact_left(problem: &Problem<'_>, predicted: &Prediction) -> Vec<f64> {
-    let mut left: Vec<f64> = problem.measured().zip(&predicted.shown_nm).map(|(y, x)| y - x).collect();
-    problem.noise.innovations(&mut left);
-    left
-}
-
-/// Samples at which errors are taken: bristles at rest and the instants at which they break away show no law.
-fn known_samples(problem: &Problem<'_>) -> Vec<usize> {
-    let limit = problem.well_known_nm();
-    let usable = problem.logs.iter().flat_map(|log| log.usable.iter().copied()).enumerate();
-    usable.filter(|(i, usable)| *usable && problem.noise.named(*i) < limit).map(|(i, _)| i).collect()
 }
 
 /// Deviation of each sample that noise alone leaves: that of the sensors, as many times as a fit to the training logs leaves there
@@ -226,8 +212,8 @@ fn contact_noise(
     let mut there = contact.problem();
     there.noise = there.noise_at(&fit.terms, &fit.p);
     let fitted = there.predict(&fit.terms, &fit.p);
-    let left = contact_left(&there, &fitted);
-    let times = rest::over_named(&of_sensors(&there, &fitted), &left, &known_samples(&there));
+    let left = there.left(&fitted);
+    let times = rest::over_named(&of_sensors(&there, &fitted), &left, &there.compared());
     of_sensors(problem, predicted).into_iter().map(|deviation| times * deviation).collect()
 }
 

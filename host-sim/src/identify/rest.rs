@@ -6,7 +6,7 @@ use super::contact::change::Bridge;
 use super::contact::channel::before_ringing;
 use super::contact::log::ContactLog;
 use super::contact::noise::MODEL_FORM;
-use super::contact::problem::{Fit, Problem, Role};
+use super::contact::problem::{Fit, PredictionErrors, Problem, Role};
 use super::contact::search;
 use super::contact_part::{ContactPart, DiscCause};
 use super::effects;
@@ -258,11 +258,11 @@ impl Ground {
         self.beyond(&self.noise, residual)
     }
 
-    /// What lasts, or what single samples have beyond noise, however rare they are, where that is more. What is rare is the tail of a
-    /// cause's law, as the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
-    fn or_rare(&self, lasting: (f64, f64), residual: &[f64]) -> (f64, f64) {
-        let each = beyond_noise(residual, &self.of_sample, &self.rows, 1, self.of_bridge[1], 0.0);
-        more(lasting, each)
+    /// What a prediction leaves beyond noise in single samples, however rare they are. What is rare is the tail of a cause's law, as
+    /// the blows of a tooth are. Where nothing acts there is no law whose tail it could be.
+    fn rare(&self, predicted: &PredictionErrors) -> (f64, f64) {
+        let noise = Noise::white(predicted.named_nm.iter().map(|named| NAMED_WITHIN * named).collect());
+        beyond_noise(&predicted.left_nm, &noise, &predicted.compared, 1, self.of_bridge[1], 0.0)
     }
 
     /// The same beyond this noise of blocks.
@@ -371,10 +371,12 @@ impl<'c> LeftByContact<'c> {
             // What cannot be looked at is not explained.
             return Rest { size: 1.0, share: 1.0, ..Rest::default() };
         }
-        let of = |residual_nm: &[f64]| {
-            let lasting = ground.structured(residual_nm);
-            if effects.is_empty() { ground.or_rare(lasting, residual_nm) } else { lasting }
-        };
+        // What a fit leaves out, since held bristles tell little of a law, the model leaves all the same.
+        let rare = effects.is_empty().then(|| match without {
+            Some(cause) => ground.rare(&cause.errors_as_logged),
+            None => ground.rare(&PredictionErrors::new(&problem, fit)),
+        });
+        let of = |residual_nm: &[f64]| rare.into_iter().fold(ground.structured(residual_nm), more);
         let (rest, left) = of(residual_nm);
         let before = as_logged.as_ref().or(none).map_or(rest, |none| of(&ground.in_units(none)).0);
         let mut follows = if rest > 0.0 {
@@ -566,7 +568,8 @@ mod tests {
             deviation: vec![0.1; LONG],
             noise: Noise::white(vec![0.1; LONG]),
             of_sample: Noise::white(vec![0.1 * NAMED_WITHIN; LONG]),
-            rows: (0..LONG).collect(),
+            // The fit leaves out where they are: it takes that for noise, or bristles are held there and tell no law.
+            rows: (200..LONG).collect(),
             blocks: blocks(1e-3),
             of_bridge: [0.0; 2],
             signal: 1.0,
@@ -578,11 +581,12 @@ mod tests {
             (0..LONG).map(|i| blow(i) * if i % 2 == 0 { 1.0 } else { -1.0 }).collect()
         };
         let of = |residual: &[f64]| {
-            let lasting = ground.structured(residual);
-            [lasting.0, ground.or_rare(lasting, residual).0]
+            let (named_nm, compared) = (vec![0.1; LONG], (0..LONG).collect());
+            let errors = PredictionErrors { left_nm: residual.to_vec(), named_nm, compared };
+            [ground.structured(residual).0, ground.rare(&errors).0]
         };
-        let [lasting, with_rare] = of(&residual(30.0));
-        assert!(lasting < 1e-9 && with_rare > 0.5, "{lasting} {with_rare}");
+        let [lasting, rare] = of(&residual(30.0));
+        assert!(lasting < 1e-9 && rare > 0.5, "{lasting} {rare}");
         // What is a few times as large as noise, and as rare, is its tail.
         assert_eq!(of(&residual(0.5)), [0.0; 2]);
     }

@@ -68,6 +68,8 @@ pub struct Noise {
     /// slips and sticks faster than samples tell. It is the same for every hypothesis: one that is certain of a sample would
     /// pay for it, and one that is not would not.
     pub known: Vec<bool>,
+    /// Where the samples tell slip and stick apart: no law of held bristles shows there, and whether the tip was held does.
+    resolved: Vec<bool>,
     /// [`certainty`](super::observer::Observed::certainty) of each sample by the numbers that this noise is of: one that moved with a
     /// stiffness would draw it to where a sample says nothing.
     certainty: Vec<f64>,
@@ -170,10 +172,11 @@ impl Noise {
             (out + if *resolved { 0.0 } else { step_s }, all + step_s)
         });
         let known =
-            certainty.iter().zip(resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && resolved).collect();
+            certainty.iter().zip(&resolved).map(|(c, resolved)| *c > LEAST_CERTAINTY && *resolved).collect();
         let mut noise = Self {
             sources,
             known,
+            resolved,
             certainty,
             unresolved_s,
             temper: 3.0,
@@ -208,7 +211,9 @@ impl Noise {
 
     /// Leaves out what the model of another hypothesis leaves out too.
     pub fn leave_out(&mut self, other: &Self) {
-        self.known.iter_mut().zip(&other.known).for_each(|(known, other)| *known &= other);
+        for (own, other) in [(&mut self.known, &other.known), (&mut self.resolved, &other.resolved)] {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own &= other);
+        }
         self.unresolved_s.0 = self.unresolved_s.0.max(other.unresolved_s.0);
     }
 
@@ -216,6 +221,14 @@ impl Noise {
     /// alone leaves.
     pub fn named(&self, sample: usize) -> f64 {
         self.named[sample]
+    }
+
+    /// Samples at which a prediction can be held against what was measured, of those that may be used: all that named sources leave
+    /// this well known, and at which slip and stick are told apart.
+    pub fn compared(&self, usable: impl Iterator<Item = bool>, limit: f64) -> Vec<usize> {
+        let each = usable.zip(&self.resolved).zip(&self.named).enumerate();
+        let told = each.filter(|(_, ((usable, resolved), named))| *usable && **resolved && **named < limit);
+        told.map(|(i, _)| i).collect()
     }
 
     /// Deviation of each sample from what is named and the slow noise of `fitted`, the noise in logs of the same rig. That shows where the tip slides, and is no more than a bridge's zero of this deviation: beyond that it is nothing of a
@@ -509,12 +522,19 @@ mod tests {
     fn what_either_model_does_not_resolve_is_left_out_and_told() {
         let of = |known: [bool; 4], out_s: f64| Noise {
             known: known.to_vec(),
+            resolved: known.to_vec(),
+            named: vec![0.1, 0.1, 0.1, 0.1],
             unresolved_s: (out_s, 4.0),
             ..Noise::default()
         };
         let mut noise = of([true, false, true, true], 1.0);
         noise.leave_out(&of([true, true, false, false], 2.0));
         assert_eq!(noise.known, [true, false, false, false]);
+        // Errors are taken where samples are resolved, whether the fit counts them or not, and noise leaves them known.
+        let mut own = of([true, false, true, true], 1.0);
+        (own.known[0], own.named[2]) = (false, 1.0);
+        assert_eq!(own.compared([true; 4].into_iter(), 0.5), [0, 3]);
+        assert_eq!(own.compared([false, true, true, true].into_iter(), 0.5), [3]);
         assert!(noise.unresolved().unwrap().starts_with("2.0 s of 4.0 s"));
     }
 

@@ -280,6 +280,26 @@ pub struct Problem<'a> {
     pub noise: Noise,
 }
 
+/// Errors of a prediction.
+#[derive(Debug, Clone, Default)]
+pub struct PredictionErrors {
+    /// What is measured less predicted, N m.
+    pub left_nm: Vec<f64>,
+    /// Deviation of each sample from its named sources, N m.
+    pub named_nm: Vec<f64>,
+    /// Samples at which they are taken.
+    pub compared: Vec<usize>,
+}
+
+impl PredictionErrors {
+    /// Of a fit.
+    pub fn new(problem: &Problem<'_>, fit: &Fit) -> Self {
+        let left_nm = problem.left(&problem.predict(&fit.terms, &fit.p));
+        let named_nm = (0..left_nm.len()).map(|i| problem.noise.named(i)).collect();
+        Self { left_nm, named_nm, compared: problem.compared() }
+    }
+}
+
 impl<'a> Problem<'a> {
     /// For these logs; the noise model is that of the baseline as the model file has it.
     pub fn new(logs: &'a [ContactLog], baseline: &'a Baseline, terms: &'a [ContactTerm]) -> Self {
@@ -315,6 +335,19 @@ impl<'a> Problem<'a> {
     /// Deviation up to which a sample of the friction channel is well known, N m: sizes and rests are taken there.
     pub fn well_known_nm(&self) -> f64 {
         WELL_KNOWN * rms(&self.measured().collect::<Vec<_>>())
+    }
+
+    /// Samples at which errors of a prediction are taken.
+    pub fn compared(&self) -> Vec<usize> {
+        let usable = self.logs.iter().flat_map(|log| log.usable.iter().copied());
+        self.noise.compared(usable, self.well_known_nm())
+    }
+
+    /// What is measured less predicted, but for what it was seen to swing with, N m.
+    pub fn left(&self, predicted: &Prediction) -> Vec<f64> {
+        let mut left: Vec<f64> = self.measured().zip(&predicted.shown_nm).map(|(y, x)| y - x).collect();
+        self.noise.innovations(&mut left);
+        left
     }
 
     fn contact(&self, numbers: &Numbers, change: &Change) -> Contact {
