@@ -303,16 +303,22 @@ impl Coupling {
         }
     }
 
-    /// Occam's factor of the numbers, as a logarithm: logarithms are equally likely between their ends, which is told by a normal
-    /// prior of the same deviation.
-    pub fn log_occam(&self, curvature: &DMatrix<f64>) -> f64 {
-        let even = |[low, high]: [f64; 2]| (high / low).ln() / 12f64.sqrt();
-        let always = [even(HERTZ), even(DAMPING_RATIO), even(DISC_SHARE)];
-        let gap = (self.gap > 0.0).then(|| even(PLAYS));
-        let bend = (self.bend > 0.0).then_some(BEND_SD);
-        let soft = (self.soft_share > 0.0).then(|| 12f64.sqrt().recip());
-        let sd: Vec<f64> = always.into_iter().chain(gap).chain(bend).chain(soft).collect();
-        log_occam(curvature, BALANCE_SHARE, &sd)
+    /// What their priors make of the numbers, as a logarithm: Occam's factor, and how far they are from what is usual. Logarithms are
+    /// normal about the middle of what is allowed, with the deviation of one that is equally likely between its ends: what lies at
+    /// the ends of several is no coupling but a lag, or a small mass that takes what another law leaves.
+    pub fn log_prior(&self, curvature: &DMatrix<f64>, machine: &Machine) -> f64 {
+        let deviation = |[low, high]: [f64; 2]| (high / low).ln() / 12f64.sqrt();
+        let of = |range: [f64; 2], value: f64| {
+            let sd = deviation(range);
+            (sd, (value / (range[0] * range[1]).sqrt()).ln() / sd)
+        };
+        let always =
+            [of(HERTZ, self.mode_hz), of(DAMPING_RATIO, self.damping_ratio), of(DISC_SHARE, self.disc_share)];
+        let gap = (self.gap > 0.0).then(|| of(PLAYS, self.gap / machine.play()));
+        let (mut sd, off): (Vec<f64>, Vec<f64>) = always.into_iter().chain(gap).unzip();
+        sd.extend((self.bend > 0.0).then_some(BEND_SD));
+        sd.extend((self.soft_share > 0.0).then(|| 12f64.sqrt().recip()));
+        log_occam(curvature, BALANCE_SHARE, &sd) - 0.5 * off.iter().map(|off| off * off).sum::<f64>()
     }
 }
 

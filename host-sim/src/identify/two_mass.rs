@@ -243,7 +243,7 @@ fn searched(effect: &'static str, view: &DriveView<'_>, grid: Vec<Coupling>) -> 
             let alternative = alternative(effect, view, numbers, bearing, pull)?;
             Some(view.balance.glance(&view.company.with(&alternative), near).innovations)
         };
-        refined(view.balance, start, trial, glance)
+        refined((view.balance, &machine(view)), start, trial, glance)
     };
     let better = |a: (Trial, f64), b: (Trial, f64)| {
         if a.0.seen.log_evidence + a.1 < b.0.seen.log_evidence + b.1 { b } else { a }
@@ -360,16 +360,16 @@ struct Trial {
 }
 
 /// Gauss–Newton with damping on the logarithms; the base parameters are solved for each trial (variable projection). With
-/// Occam's factor of the numbers; `None` where no derivative exists. `glance` is what a coupling leaves near a trial.
+/// what the priors make of the numbers; `None` where no derivative exists. `glance` is what a coupling leaves near a trial.
 fn refined(
-    balance: &Balance,
+    (balance, machine): (&Balance, &Machine),
     start: Trial,
     trial: impl Fn(&Coupling, &[f64]) -> Option<Trial>,
     glance: impl Fn(&Coupling, &[f64]) -> Option<Vec<f64>> + Sync,
 ) -> Option<(Trial, f64)> {
     let step = if start.numbers.gap > 0.0 { STEP_OVER_PLAY } else { STEP };
     let mut best = start;
-    let mut log_occam = None;
+    let mut log_prior = None;
     let mut damping = 1e-2;
     let mut slopes: Option<Vec<Slope>> = None;
     for _ in 0..ITERATIONS {
@@ -390,7 +390,7 @@ fn refined(
         let Some(mut columns) = taken else { break };
         let weights: Vec<f64> = r.iter().map(|r| student_weight(*r) / balance.temper).collect();
         let (h, g) = linear::normal_equations(&columns, &weights, r);
-        log_occam = Some(best.numbers.log_occam(&h));
+        log_prior = Some(best.numbers.log_prior(&h, machine));
         let mut better = None;
         for _ in 0..if fresh { 4 } else { 1 } {
             let mut damped = h.clone();
@@ -430,7 +430,7 @@ fn refined(
             break;
         }
     }
-    Some((best, log_occam?))
+    Some((best, log_prior?))
 }
 
 #[cfg(test)]
